@@ -1,0 +1,1 @@
+"""``params.yaml`` as frozen, validated sections; ``config.loader`` reads the file."""

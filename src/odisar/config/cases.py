@@ -1,0 +1,188 @@
+"""A case: one machine, its channels, and what is asked of the twin. A new case needs no code."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from odisar.config.base import Section
+
+PositiveInt = Annotated[int, Field(gt=0)]
+PositiveFloat = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(gt=0, lt=1)]
+
+
+class Channel(Section):
+    """One column of a recording, in physical units.
+
+    ``known_ahead`` is only for commands whose future is planned when the forecast is issued: the
+    twin's decoder then sees them up to the horizon. ``min`` and ``max`` are what is physically
+    possible, not what is usual: a sample outside them is an error in the file.
+    """
+
+    name: str
+    unit: str
+    role: Literal["state", "command"]
+    output: bool
+    known_ahead: bool
+    min: float
+    max: float
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.min >= self.max:
+            raise ValueError(f"channel {self.name!r}: min={self.min} must be below max={self.max}")
+        if self.known_ahead and self.role != "command":
+            raise ValueError(
+                f"channel {self.name!r}: known_ahead needs role: command; the future of a state "
+                "is what the twin forecasts"
+            )
+        if self.output and self.role != "state":
+            raise ValueError(f"channel {self.name!r}: only a state can be an output")
+        return self
+
+
+class Source(Section):
+    """Where a case's recordings lie: a folder of CSV files, with or without ``recordings.csv``."""
+
+    folder: str
+    time_column: str
+    max_recordings: PositiveInt
+
+
+class WindowConfig(Section):
+    """Context (what the twin sees) and horizon (what it forecasts), in steps of ``1 / rate_hz``."""
+
+    context_steps: PositiveInt
+    horizon_steps: PositiveInt
+
+
+class Splits(Section):
+    """How recordings are divided before anything is windowed.
+
+    ``metadata`` takes the ``split`` column of ``recordings.csv``; ``fractions`` draws whole
+    recordings with the case's seed; ``cross-fit`` cuts every recording of split ``cross-fit``
+    into blocks, deals them over ``folds`` and lets each fold test, calibrate and validate once.
+    """
+
+    kind: Literal["metadata", "fractions", "cross-fit"]
+    fractions: dict[Literal["train", "validation", "calibration", "test"], Fraction] | None
+    folds: Annotated[int, Field(ge=4)] | None
+    block_s: PositiveFloat | None
+    block_gap_s: Annotated[float, Field(ge=0)] | None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.kind == "fractions" and (
+            self.fractions is None
+            or set(self.fractions) != {"train", "validation", "calibration", "test"}
+            or not math.isclose(sum(self.fractions.values()), 1.0)
+        ):
+            raise ValueError(
+                "splits.kind=fractions needs fractions for train, validation, calibration and "
+                "test that add up to 1"
+            )
+        if self.kind == "cross-fit" and None in (self.folds, self.block_s, self.block_gap_s):
+            raise ValueError("splits.kind=cross-fit needs folds, block_s and block_gap_s")
+        return self
+
+
+class Faults(Section):
+    """Sensor faults to inject into copies of held-out recordings (see ``recordings.faults``).
+
+    ``sizes`` are multiples of the channel's standard deviation over the training recordings for
+    noise, bias and drift (drift: at the end of the interval); ``delays_s`` are for delay.
+    """
+
+    kinds: list[Literal["noise", "bias", "drift", "stuck", "delay"]]
+    channels: list[str]
+    sizes: list[PositiveFloat]
+    delays_s: list[PositiveFloat]
+    start_s: PositiveFloat
+    duration_s: PositiveFloat
+
+
+class RangeRule(Section):
+    """A one-line check a user would try first: flag where a channel's mean leaves a range."""
+
+    name: str
+    channel: str
+    min: float
+    max: float
+
+
+class Groups(Section):
+    """Which recordings are judged together.
+
+    ``overall`` selects, by metadata column, the disturbed recordings that the ``overall`` rows and
+    the ``group_by`` rows pool; ``apart`` names columns whose other values get rows of their own.
+    """
+
+    overall: dict[str, list[str]]
+    group_by: list[str]
+    apart: list[str]
+
+
+class Case(Section):
+    """One machine: recordings, channels, window, splits and how its results are grouped."""
+
+    title: str
+    source: Source
+    rate_hz: PositiveFloat
+    max_gap_s: PositiveFloat
+    channels: Annotated[list[Channel], Field(min_length=1)]
+    window: WindowConfig
+    splits: Splits
+    persistence_s: PositiveFloat
+    guard_start_s: PositiveFloat
+    guard_end_s: PositiveFloat
+    groups: Groups
+    faults: Faults | None
+    range_rules: list[RangeRule]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        names = [channel.name for channel in self.channels]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise ValueError(f"channels: {', '.join(repeated)} declared more than once")
+        if not self.output_names:
+            raise ValueError("channels: at least one state needs output: true")
+        mentioned = [rule.channel for rule in self.range_rules]
+        mentioned += self.faults.channels if self.faults else []
+        for name in mentioned:
+            if name not in names:
+                raise ValueError(f"{name!r} is not one of the channels: {', '.join(names)}")
+        return self
+
+    @property
+    def channel_names(self) -> list[str]:
+        """Names of all channels, in the order of the value array's last axis."""
+        return [channel.name for channel in self.channels]
+
+    @property
+    def output_names(self) -> list[str]:
+        """Names of the forecast states, in the order of the forecast's last axis."""
+        return [channel.name for channel in self.channels if channel.output]
+
+    @property
+    def output_indices(self) -> list[int]:
+        """Positions of the forecast states among the channels."""
+        return [i for i, channel in enumerate(self.channels) if channel.output]
+
+    @property
+    def known_ahead_indices(self) -> list[int]:
+        """Positions of the commands known over the horizon among the channels."""
+        return [i for i, channel in enumerate(self.channels) if channel.known_ahead]
+
+
+class Setup(Section):
+    """What one twin is trained and judged on: a case, and which of its recordings train it.
+
+    ``select`` keeps, by metadata column, the recordings for train, validation and calibration;
+    development and test are never narrowed, so that set-ups are judged on the same recordings.
+    """
+
+    case: str
+    select: dict[str, list[str]]
+    published_as: str | None

@@ -1,0 +1,67 @@
+"""Sections for the twin, its training and its tuning."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from odisar.config.base import Section
+from odisar.config.cases import PositiveFloat, PositiveInt
+
+DropoutRate = Annotated[float, Field(ge=0, lt=1)]
+
+
+class TwinConfig(Section):
+    """Shape of the Transformer (paper, Table "Model and Training Parameters")."""
+
+    patch_steps: PositiveInt
+    model_dim: PositiveInt
+    heads: PositiveInt
+    layers: PositiveInt
+    feedforward_dim: PositiveInt
+    reconstruction_dim: PositiveInt
+    dropout: DropoutRate
+    detach_reconstruction: bool
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.model_dim % self.heads:
+            raise ValueError(
+                f"twin.model_dim={self.model_dim} must be a multiple of twin.heads={self.heads}"
+            )
+        return self
+
+
+class TrainingConfig(Section):
+    """How a twin is trained. An epoch is ``steps_per_epoch`` batches drawn by the epoch's seed."""
+
+    batch_size: PositiveInt
+    learning_rate: PositiveFloat
+    epochs: PositiveInt
+    steps_per_epoch: PositiveInt
+    patience_epochs: PositiveInt
+    gradient_clip: PositiveFloat
+    validation_stride_steps: PositiveInt
+
+
+class LearningRateRange(Section):
+    """Bounds of a log-uniform search."""
+
+    low: PositiveFloat
+    high: PositiveFloat
+
+
+class TuningConfig(Section):
+    """The Optuna study: what is searched, for how long. Dropout is not searched (it would vanish).
+
+    ``storage`` is ``journal`` (a file, on one machine) or the URL of a database for several.
+    """
+
+    trials: PositiveInt
+    steps_per_trial: PositiveInt
+    reports_per_trial: PositiveInt
+    pruner_warmup_trials: PositiveInt
+    learning_rate: LearningRateRange
+    model_dim: list[PositiveInt]
+    layers: list[PositiveInt]
+    feedforward_dim: list[PositiveInt]
+    storage: str

@@ -1,0 +1,153 @@
+"""Read ``params.yaml``, whole, before any work; every complaint at once, with the way out."""
+
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from odisar.config.base import Section
+from odisar.config.cases import Case, PositiveInt, Setup
+from odisar.config.judging import CapabilityConfig, EvaluationConfig
+from odisar.config.learning import TrainingConfig, TuningConfig, TwinConfig
+from odisar.config.simulators import SimulatorsConfig
+from odisar.config.sources import SourcesConfig
+from odisar.errors import OdisarError
+
+PARAMS_FILE = "params.yaml"
+
+
+class PipelineConfig(Section):
+    """What one run of the pipeline trains and judges, and with how many processes."""
+
+    setups: list[str] = Field(min_length=1)
+    workers: PositiveInt
+    accelerator: str
+
+
+class TrackingConfig(Section):
+    """Where runs are logged: the MLflow experiment."""
+
+    experiment: str
+
+
+class ReportConfig(Section):
+    """What the report says above its results."""
+
+    title: str
+    example_recording: str
+
+
+class Config(Section):
+    """The whole of ``params.yaml``."""
+
+    seed: int = Field(ge=0)
+    pipeline: PipelineConfig
+    setups: dict[str, Setup]
+    cases: dict[str, Case]
+    twin: TwinConfig
+    training: TrainingConfig
+    tuning: TuningConfig
+    capability: CapabilityConfig
+    evaluation: EvaluationConfig
+    tracking: TrackingConfig
+    report: ReportConfig
+    simulators: SimulatorsConfig
+    sources: SourcesConfig
+    profiles: dict[str, dict[str, Any]]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in self.pipeline.setups:
+            if name not in self.setups:
+                raise ValueError(
+                    f"pipeline.setups: {name!r} is not declared under setups; declared are: "
+                    f"{', '.join(self.setups)}"
+                )
+        for name, setup in self.setups.items():
+            if setup.case not in self.cases:
+                raise ValueError(
+                    f"setups.{name}.case: {setup.case!r} is not declared under cases; declared "
+                    f"are: {', '.join(self.cases)}"
+                )
+        for name, case in self.cases.items():
+            for field in ("context_steps", "horizon_steps"):
+                steps = getattr(case.window, field)
+                if steps % self.twin.patch_steps:
+                    raise ValueError(
+                        f"cases.{name}.window.{field}={steps} must be a multiple of "
+                        f"twin.patch_steps={self.twin.patch_steps}"
+                    )
+        return self
+
+    def case_of(self, setup: str) -> Case:
+        """Return the case that a set-up is trained on."""
+        return self.cases[self.setups[setup].case]
+
+    @property
+    def active_cases(self) -> list[str]:
+        """Names of the cases that this pipeline's set-ups need, in order, once each."""
+        return list(dict.fromkeys(self.setups[name].case for name in self.pipeline.setups))
+
+
+class ConfigView:
+    """The sections a stage has declared, and no other: an undeclared read fails loudly.
+
+    DVC reruns a stage when the parameters it *declares* change. A stage that reads another one
+    would go stale silently, so it cannot.
+    """
+
+    def __init__(self, config: Config, sections: tuple[str, ...]) -> None:
+        self._config = config
+        self.sections = sections
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a declared section."""
+        if name.startswith("_"):  # asked for while a copy for another process is being built
+            raise AttributeError(name)
+        if name in ("case_of", "active_cases"):
+            return getattr(self._config, name)
+        if name not in self.sections:
+            raise AttributeError(
+                f"this stage reads section {name!r} of {PARAMS_FILE} but declares only "
+                f"{', '.join(self.sections)}"
+            )
+        return getattr(self._config, name)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read a YAML mapping; raise OdisarError where it cannot be read or is not one."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise OdisarError(
+            f"{path}: cannot be read ({error}); run this in the project's root"
+        ) from error
+    try:
+        loaded = YAML(typ="safe", pure=True).load(text)
+    except YAMLError as error:
+        raise OdisarError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(loaded, dict):
+        raise OdisarError(f"{path}: expected a mapping of sections, found {type(loaded).__name__}")
+    return loaded
+
+
+def parse_config(raw: dict[str, Any], origin: str) -> Config:
+    """Validate a whole configuration; every complaint names its key."""
+    try:
+        return Config.model_validate(raw)
+    except ValidationError as error:
+        lines = [f"{origin}: {error.error_count()} problem(s), nothing was run:"]
+        for problem in error.errors(include_url=False):
+            key = ".".join(str(part) for part in problem["loc"]) or "(whole file)"
+            given = problem["input"]
+            shown = f" (found {given!r})" if not isinstance(given, dict | list | Section) else ""
+            lines.append(f"  {key}: {problem['msg'].removeprefix('Value error, ')}{shown}")
+        raise OdisarError("\n".join(lines)) from error
+
+
+def load_config(root: Path) -> Config:
+    """Read and validate ``params.yaml`` in ``root``."""
+    path = root / PARAMS_FILE
+    return parse_config(read_yaml(path), str(PARAMS_FILE))

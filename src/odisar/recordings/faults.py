@@ -1,0 +1,203 @@
+"""Sensor faults injected into copies of clean held-out recordings.
+
+The kinds and their sizes in multiples of the channel's standard deviation follow the usual
+taxonomy of sensor faults: noise, bias, drift, stuck and delayed values.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odisar.config.cases import Case, Faults
+from odisar.errors import OdisarError
+from odisar.recordings.schema import Interval, Recording, label_times
+from odisar.seeding import generator
+
+# Written times have six decimals: two that are equal may differ by this.
+_ROUNDING_S = 1e-6
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """One fault: ``amount`` is standard deviations, seconds (delay) or None (stuck)."""
+
+    kind: str
+    channel: str
+    amount: float | None
+
+    @property
+    def slug(self) -> str:
+        channel = re.sub(r"[^a-z0-9]+", "_", self.channel.lower()).strip("_")
+        parts = [self.kind, channel] + ([] if self.amount is None else [str(self.amount)])
+        return "-".join(parts)
+
+
+def inject_faults(
+    recordings: Sequence[Recording],
+    case: Case,
+    channel_std: NDArray[np.float64],
+    base_seed: int,
+) -> list[Recording]:
+    """Return one faulty copy for each clean recording and each fault of the case.
+
+    Parameters
+    ----------
+    recordings
+        Held-out recordings or blocks; those with a disturbance are passed over.
+    channel_std
+        (channel,) standard deviation over the training recordings, in physical units.
+    base_seed
+        Seed from which onset and noise of every copy derive, by the copy's name.
+
+    Returns
+    -------
+    list[Recording]
+        Copies with the fault's interval as their label and the original's cluster
+        (``base_seed``). Outside the interval the values are those of the original, bit for bit.
+
+    Raises
+    ------
+    OdisarError
+        If a fault does not fit into a recording, or two copies would share a name.
+    """
+    if case.faults is None:
+        return []
+    clean = [recording for recording in recordings if not recording.info.is_disturbed]
+    faults = list(_faults(case.faults))
+    _check_fit(clean, case.faults, case.rate_hz)
+    _check_slugs(faults)
+    return [
+        _faulty_copy(recording, fault, case.faults, case, channel_std, base_seed)
+        for recording in clean
+        for fault in faults
+    ]
+
+
+def _faults(faults: Faults) -> Iterator[_Fault]:
+    for kind in faults.kinds:
+        amounts: list[float | None] = [*faults.sizes]
+        if kind == "stuck":
+            amounts = [None]
+        elif kind == "delay":
+            amounts = [*faults.delays_s]
+        for channel in faults.channels:
+            for amount in amounts:
+                yield _Fault(kind, channel, amount)
+
+
+def _check_slugs(faults: Sequence[_Fault]) -> None:
+    slugs = [fault.slug for fault in faults]
+    repeated = sorted({slug for slug in slugs if slugs.count(slug) > 1})
+    if repeated:
+        raise OdisarError(
+            f"faults: {', '.join(repeated)} would be made twice; remove the repeated kind, size "
+            "or delay, or give the channels names that differ by more than punctuation"
+        )
+
+
+def _check_fit(recordings: Sequence[Recording], faults: Faults, rate_hz: float) -> None:
+    if faults.duration_s * rate_hz < 1:
+        raise OdisarError(
+            f"faults.duration_s={faults.duration_s:g} is shorter than one sample at "
+            f"rate_hz={rate_hz:g}: raise it"
+        )
+    longest_s = max(faults.delays_s, default=0.0) if "delay" in faults.kinds else 0.0
+    if longest_s > faults.start_s:
+        raise OdisarError(
+            f"faults.delays_s={longest_s:g} reaches back before the recording, because "
+            f"faults.start_s={faults.start_s:g}: raise start_s or lower the delay"
+        )
+    short = [
+        f"{item.name} ({item.time_s[-1] - item.time_s[0] + 1.0 / rate_hz:g} s)"
+        for item in recordings
+        if not len(_onsets(item, faults, rate_hz))
+    ]
+    if short:
+        raise OdisarError(
+            f"faults need {faults.start_s + faults.duration_s:g} s (start_s + duration_s) with "
+            f"duration_s free of gaps, which these recordings lack: {', '.join(short)}. Lower "
+            "start_s or duration_s, or lengthen the recordings (splits.block_s for blocks)"
+        )
+
+
+def _onsets(recording: Recording, faults: Faults, rate_hz: float) -> NDArray[np.int64]:
+    """Return the samples at which a fault can begin and end before the segment does."""
+    time_s = recording.time_s
+    earliest_s = time_s[0] + faults.start_s - _ROUNDING_S
+    onsets = [np.empty(0, dtype=np.int64)]
+    for start, stop in recording.segments:
+        latest_s = time_s[stop - 1] + 1.0 / rate_hz - faults.duration_s + _ROUNDING_S
+        inside = time_s[start:stop]
+        onsets.append(start + np.flatnonzero((inside >= earliest_s) & (inside <= latest_s)))
+    return np.concatenate(onsets)
+
+
+def _faulty_copy(
+    recording: Recording,
+    fault: _Fault,
+    where: Faults,
+    case: Case,
+    channel_std: NDArray[np.float64],
+    base_seed: int,
+) -> Recording:
+    name = f"{recording.name}-{fault.slug}"
+    random = generator(base_seed, "faults", name)
+    start_s = float(recording.time_s[random.choice(_onsets(recording, where, case.rate_hz))])
+    interval = Interval(start_s, start_s + where.duration_s, fault.kind)
+    column = case.channel_names.index(fault.channel)
+    inside = label_times(recording.time_s, [interval])
+    values = recording.values.copy()
+    values[inside, column] = _faulty_values(
+        fault, recording, inside, column, float(channel_std[column]), random
+    )
+    return replace(
+        recording,
+        name=name,
+        info=replace(
+            recording.info,
+            disturbance=fault.kind,
+            components="all",
+            strength=None,
+            base_seed=recording.info.base_seed or recording.name,
+            extra=_extra(recording.info.extra, fault),
+        ),
+        values=values,
+        intervals=(interval,),
+    )
+
+
+def _extra(extra: Mapping[str, str], fault: _Fault) -> dict[str, str]:
+    unit = "s" if fault.kind == "delay" else "sd"
+    size = "" if fault.amount is None else f"{fault.amount:g} {unit}"
+    return {**extra, "fault_channel": fault.channel, "fault_size": size}
+
+
+def _faulty_values(
+    fault: _Fault,
+    recording: Recording,
+    inside: NDArray[np.bool_],
+    column: int,
+    std: float,
+    random: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Return what the sensor shows instead, at the samples ``inside`` (sample,) the interval."""
+    truth = recording.values[:, column]
+    time_s = recording.time_s
+    size = 0.0 if fault.amount is None else fault.amount * std
+    samples = int(inside.sum())
+    if fault.kind == "noise":
+        return truth[inside] + random.normal(0.0, size, samples)
+    if fault.kind == "bias":
+        return truth[inside] + size
+    if fault.kind == "drift":
+        return truth[inside] + np.linspace(0.0, size, samples)
+    if fault.kind == "stuck":
+        return np.full(samples, truth[np.flatnonzero(inside)[0] - 1])
+    # Across a gap a delayed sensor shows the last value before the gap.
+    sources = (
+        np.searchsorted(time_s, time_s[inside] - (fault.amount or 0.0) + _ROUNDING_S, "right") - 1
+    )
+    return truth[sources]

@@ -1,0 +1,1 @@
+"""Public recordings: fetch a pinned file, convert it to a folder that the reader takes."""
