@@ -1,0 +1,7 @@
+"""``python -m odisar``."""
+
+import sys
+
+from odisar.cli import main
+
+sys.exit(main())

@@ -1,0 +1,1 @@
+"""What a user would try instead: detectors that need no capability."""

@@ -1,0 +1,1 @@
+"""The digital twin capability (DTC): scores, thresholds, quadrants, attribution, assessment."""

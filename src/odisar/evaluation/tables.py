@@ -1,0 +1,226 @@
+"""Tables: every detector under every protocol on every group of recordings, with intervals."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from odisar.config.cases import Groups
+from odisar.config.judging import Judging
+from odisar.errors import OdisarError
+from odisar.evaluation.cells import Cell, cell_resampler, describe, disturbed_cells
+from odisar.evaluation.intervals import (
+    Interval,
+    Resampler,
+    bin_counts,
+    bin_edges,
+    shift_interval,
+)
+from odisar.evaluation.metrics import (
+    auroc_of_counts,
+    confusion_of_counts,
+    count_confusion,
+    count_levels,
+    tnr_of_counts,
+)
+from odisar.evaluation.operating import operating_rows, operating_table
+from odisar.evaluation.protocols import PROTOCOLS, Samples, take_samples
+from odisar.evaluation.published import (
+    PUBLISHED_PROTOCOLS,
+    is_full_strength,
+    published_values,
+)
+from odisar.evaluation.scored import ORACLE, ScoredRecording
+from odisar.evaluation.window_tables import attribution_table, quadrant_table
+
+__all__ = [
+    "DETECTION_COLUMNS",
+    "attribution_table",
+    "detection_table",
+    "operating_table",
+    "quadrant_table",
+]
+
+DETECTION_COLUMNS = (
+    "setup",
+    "evaluated_on",
+    "strength",
+    "protocol",
+    "detector",
+    "metric",
+    "value",
+    "ci_low",
+    "ci_high",
+    "published",
+)
+
+Row = dict[str, object]
+
+
+def detection_table(
+    scored: Mapping[str, Sequence[ScoredRecording]],
+    case_groups: Groups,
+    cfg: Judging,
+    persistence_s: float,
+    base_seed: int,
+    published_as: Mapping[str, str | None],
+) -> pd.DataFrame:
+    """Return the tidy table of detection and operating metrics of one case.
+
+    Parameters
+    ----------
+    scored
+        By set-up, the scored test recordings; their order has no influence.
+    case_groups
+        Which recordings are judged together.
+    cfg
+        Guards, confidence, and bootstrap draws and bins.
+    persistence_s
+        How long a score must be high to raise an alarm.
+    base_seed
+        The seed from which the bootstrap's are derived.
+    published_as
+        By set-up, the name under which the paper published it, or None.
+
+    Returns
+    -------
+    DataFrame with ``DETECTION_COLUMNS``. Shares are fractions, times seconds. ``strength`` is
+    empty for recordings without one, the interval where it cannot be estimated (one cluster) or
+    has no bound, ``published`` where the paper has no figure.
+    """
+    rows: list[Row] = []
+    for setup, given in scored.items():
+        recordings = sorted(given, key=lambda item: item.name)
+        check_detectors(setup, recordings)
+        descriptions = [describe(item.info, case_groups) for item in recordings]
+        cells = disturbed_cells(descriptions, case_groups)
+        resamplers = [
+            cell_resampler(cell, [recordings[i].cluster for i in cell.members], cfg, base_seed)
+            for cell in cells
+        ]
+        found = _detection_rows(recordings, cells, resamplers, cfg)
+        found += operating_rows(recordings, case_groups, cfg, persistence_s, base_seed)
+        rows += [{"setup": setup, **row} for row in found]
+    table = pd.DataFrame(rows, columns=list(DETECTION_COLUMNS))
+    table["published"] = [
+        _published(row, published_as.get(str(row["setup"])))
+        for row in table.to_dict(orient="records")
+    ]
+    return table
+
+
+def check_detectors(setup: str, recordings: Sequence[ScoredRecording]) -> None:
+    """Raise if recordings of a set-up differ in their detectors or share a name."""
+    if not recordings:
+        raise OdisarError(f"set-up {setup!r} has no scored recordings to evaluate")
+    first = recordings[0]
+    for before, item in pairwise(recordings):
+        if item.name == before.name:
+            raise OdisarError(f"set-up {setup!r}: recording {item.name!r} is scored twice")
+        if set(item.detectors) != set(first.detectors):
+            raise OdisarError(
+                f"set-up {setup!r}: recording {item.name!r} has scores of "
+                f"{sorted(item.detectors)}, {first.name!r} of {sorted(first.detectors)}; score "
+                "all recordings with the same detectors"
+            )
+
+
+def _published(row: Mapping[object, object], setup: str | None) -> float:
+    if (
+        setup is None
+        or row["protocol"] not in PUBLISHED_PROTOCOLS
+        or not is_full_strength(float(str(row["strength"])))
+    ):
+        return float("nan")
+    key = (setup, str(row["evaluated_on"]), str(row["detector"]), str(row["metric"]))
+    return published_values().get(key, float("nan"))
+
+
+def _detection_rows(
+    recordings: Sequence[ScoredRecording],
+    cells: Sequence[Cell],
+    resamplers: Sequence[Resampler],
+    cfg: Judging,
+) -> list[Row]:
+    """Return the rows of one set-up; what a recording contributes is computed once."""
+    rows: list[Row] = []
+    used = {int(i) for cell in cells for i in cell.members}
+    for protocol in PROTOCOLS:
+        samples = {i: take_samples(recordings[i], protocol, cfg) for i in sorted(used)}
+        for detector in (*recordings[0].detectors, ORACLE):
+            parts = _contributions(samples, detector, cfg.bootstrap_bins)
+            for cell, resampler in zip(cells, resamplers, strict=True):
+                measured = _measure([parts[i] for i in cell.members], resampler)
+                rows += [
+                    {
+                        "evaluated_on": cell.evaluated_on,
+                        "strength": cell.strength_or_nan,
+                        "protocol": protocol,
+                        "detector": detector,
+                        "metric": metric,
+                        "value": value,
+                        "ci_low": interval[0],
+                        "ci_high": interval[1],
+                    }
+                    for metric, (value, interval) in measured.items()
+                ]
+    return rows
+
+
+@dataclass(frozen=True)
+class _Contribution:
+    """What one recording adds to every cell, for one protocol and detector.
+
+    (sample,) scores and labels; (2, bin) counts by label; (4,) counts by label and flag.
+    """
+
+    scores: NDArray[np.float64]
+    labels: NDArray[np.bool_]
+    binned: NDArray[np.float64]
+    confusion: NDArray[np.float64]
+
+
+def _contributions(
+    samples: Mapping[int, Samples], detector: str, bins: int
+) -> dict[int, _Contribution]:
+    pooled = [item.scores[detector] for item in samples.values()]
+    edges = bin_edges(np.concatenate(pooled) if pooled else np.zeros(0), bins)
+    return {
+        i: _Contribution(
+            scores=item.scores[detector],
+            labels=item.labels,
+            binned=bin_counts(item.scores[detector], item.labels, edges),
+            confusion=count_confusion(item.scores[detector] > 1.0, item.labels),
+        )
+        for i, item in samples.items()
+    }
+
+
+def _measure(
+    parts: Sequence[_Contribution], resampler: Resampler
+) -> dict[str, tuple[float, Interval]]:
+    """Return value and interval of every detection metric for the recordings of one cell."""
+    levels = count_levels(
+        np.concatenate([part.scores for part in parts]),
+        np.concatenate([part.labels for part in parts]),
+    )
+    binned = np.stack([part.binned for part in parts])
+    confusions = np.stack([part.confusion for part in parts])
+    undisturbed, disturbed = binned.sum(axis=0)
+    drawn = resampler.totals(binned)
+
+    measured: dict[str, tuple[float, Interval]] = {}
+    for metric, of_counts in (("auroc", auroc_of_counts), ("tnr_at_tpr95", tnr_of_counts)):
+        value = float(of_counts(*levels))
+        offset = value - float(of_counts(disturbed, undisturbed))
+        interval = resampler.interval(of_counts(drawn[:, 1], drawn[:, 0]))
+        measured[metric] = (value, shift_interval(interval, offset))
+
+    whole = confusion_of_counts(confusions.sum(axis=0))
+    resampled = confusion_of_counts(resampler.totals(confusions))
+    measured["f1_ind"] = (float(whole.f1_ind()), resampler.interval(resampled.f1_ind()))
+    measured["f1_ood"] = (float(whole.f1_ood()), resampler.interval(resampled.f1_ood()))
+    return measured

@@ -1,0 +1,1 @@
+"""Results as figures, notebooks, and one report file."""

@@ -1,0 +1,53 @@
+"""From parameters to a printed result: recordings, MLflow store, ``dvc repro``, headline table."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from odisar.artifacts import Workspace, read_table
+from odisar.errors import OdisarError
+from odisar.making import make_recordings, run_dvc, track_recordings
+from odisar.report.headline import headline_text
+from odisar.tracking import ROOT_VARIABLE, initialise_store, tracking_root
+
+
+def reproduce(root: Path) -> None:
+    """Run everything that is not up to date in the workspace ``root``, and print what came out."""
+    make_recordings(root)
+    track_recordings(root, accept=False)
+    initialise_store(root)
+    done = subprocess.run([sys.executable, "-m", "dvc", "repro"], cwd=root)
+    if done.returncode:
+        raise OdisarError("the pipeline stopped; what went wrong stands above")
+    print_results(root)
+
+
+def reproduce_profile(root: Path, workspace: Path) -> None:
+    """Run a laid-out workspace; its runs go to the MLflow store of ``root``."""
+    os.environ[ROOT_VARIABLE] = str(tracking_root(root))
+    if not (workspace / ".dvc").exists():
+        run_dvc(workspace, "init", "--no-scm", "--quiet")
+        run_dvc(workspace, "config", "core.analytics", "false")
+    make_recordings(workspace)
+    (workspace / "data.dvc").unlink(missing_ok=True)  # a workspace accepts what it has made
+    reproduce(workspace)
+
+
+def print_results(root: Path) -> None:
+    """Print the monitor's overall results and where to look further."""
+    workspace = Workspace(root)
+    print(f"\n{headline_text(read_table(workspace.results / 'detection.csv'))}\n")  # noqa: T201
+    places = {
+        "report": workspace.report,
+        "results": workspace.results,
+        "figures": workspace.figures,
+    }
+    for name, path in places.items():
+        print(f"{name:>8}: {_shown(path)}")  # noqa: T201
+    print(f"{'runs':>8}: make ui    (MLflow, http://127.0.0.1:5000)")  # noqa: T201
+
+
+def _shown(path: Path) -> Path:
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path

@@ -1,0 +1,1 @@
+"""Thin pipeline stages: load parameters, read artefacts, call the library, write, track."""

@@ -1,0 +1,71 @@
+"""Read and check every recording of the active cases; store the good ones; show the splits."""
+
+import pandas as pd
+
+from odisar.artifacts import Workspace, write_table
+from odisar.config.loader import ConfigView
+from odisar.recordings.quality import (
+    Finding,
+    quality_table,
+    raise_on_errors,
+    write_findings,
+    write_quality_table,
+)
+from odisar.recordings.reader import read_case
+from odisar.recordings.schema import Recording
+from odisar.recordings.store import write_store
+from odisar.stages.members import hours, load_member, pipeline_members
+from odisar.tracking import TrackedRun
+
+PARAMS = ("seed", "pipeline", "setups", "cases")
+
+
+def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
+    """Run the stage; every error in any file of any case is named before it stops."""
+    findings: list[Finding] = []
+    recordings: dict[str, list[Recording]] = {}
+    tables: list[pd.DataFrame] = []
+    for name in config.active_cases:
+        result = read_case(name, config.cases[name], workspace.root)
+        findings.extend(result.findings)
+        recordings[name] = result.recordings
+        tables.append(quality_table(result.findings, result.recordings).assign(case=name))
+    raise_on_errors(findings)
+    quality = pd.concat(tables, ignore_index=True)
+    for name, group in recordings.items():
+        write_store(workspace.recordings(name), group, config.cases[name].channel_names)
+    write_quality_table(workspace.preprocess / "quality.csv", quality)
+    write_findings(workspace.preprocess / "findings.json", findings)
+    splits = split_overview(config, workspace)
+    write_table(workspace.preprocess / "splits.csv", splits)
+    print_warnings(findings)
+    tracked.metrics({"recordings": len(quality), "warnings": len(findings)})
+    tracked.artifact(workspace.preprocess / "quality.csv")
+    tracked.artifact(workspace.preprocess / "splits.csv")
+
+
+def split_overview(config: ConfigView, workspace: Workspace) -> pd.DataFrame:
+    """Return recordings, hours and windows of every split of every member."""
+    rows = []
+    for member in pipeline_members(config):
+        data = load_member(config, workspace, member)
+        for split, group in data.splits.items():
+            rows.append(
+                {
+                    "setup": member.setup,
+                    "fold": member.fold,
+                    "split": split,
+                    "recordings": len(group),
+                    "disturbed": sum(recording.info.is_disturbed for recording in group),
+                    "hours": hours(group, data.case),
+                    "windows": len(data.windows(split)) if group else 0,
+                }
+            )
+    return pd.DataFrame(rows).astype({"fold": "Int64"})
+
+
+def print_warnings(findings: list[Finding]) -> None:
+    """Say what was found but did not stop the run; the report shows it too."""
+    for finding in findings:
+        place = f"{finding.file}, {finding.column}" if finding.column else finding.file
+        print(f"warning: {place}: {finding.problem}; {finding.remedy}")  # noqa: T201

@@ -1,0 +1,78 @@
+"""Search each set-up's shape and learning rate, by its own validation recordings."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from odisar.artifacts import Workspace, write_json
+from odisar.config.loader import ConfigView
+from odisar.seeding import derive_seed
+from odisar.stages.members import Member, MemberData, load_member, setup_members
+from odisar.stages.parallel import run_jobs
+from odisar.tracking import TrackedRun, content_key
+from odisar.twin.training import TrainingPlan, use_one_thread
+from odisar.twin.tuning import TuningResult, tune_twin
+
+PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "training", "tuning")
+
+
+@dataclass(frozen=True)
+class _Job:
+    config: ConfigView
+    root: Path
+    member: Member
+    storage: str
+
+
+def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
+    """Run the stage; a killed search goes on where it was."""
+    key = content_key(workspace.root)
+    scratch = workspace.scratch / f"tune-{key}"
+    jobs = []
+    for setup in config.pipeline.setups:
+        # A cross-fitted set-up is tuned on its first fold: one shape for all of its twins.
+        member = setup_members(config, setup)[0]
+        storage = config.tuning.storage
+        journal = str(scratch / f"{setup}.journal") if storage == "journal" else storage
+        jobs.append(_Job(config, workspace.root, member, journal))
+    results = run_jobs(_tune, jobs, config.pipeline.workers)
+    for job, result in zip(jobs, results, strict=True):
+        setup = job.member.setup
+        write_json(
+            workspace.tuned(setup),
+            {
+                "configured": result.trials[0],
+                "tuned": result.best,
+                "best_validation_forecast_mse": result.best_validation_mse,
+                "trials": result.trials,
+            },
+        )
+        tracked.artifact(workspace.tuned(setup))
+        tracked.metrics({f"{setup}.best_validation_forecast_mse": result.best_validation_mse})
+        _track_trials(tracked, setup, result)
+    shutil.rmtree(scratch, ignore_errors=True)
+
+
+def training_plan(config: ConfigView, member: Member) -> TrainingPlan:
+    """Return the configured plan of a member."""
+    seed = derive_seed(config.seed, "training", member.name)
+    return TrainingPlan(config.twin, config.training, seed, config.pipeline.accelerator)
+
+
+def _tune(job: _Job) -> TuningResult:
+    use_one_thread()
+    data: MemberData = load_member(job.config, Workspace(job.root), job.member)
+    stride = job.config.training.validation_stride_steps
+    windows = data.windows("train"), data.windows("validation", stride_steps=stride)
+    study = f"{job.member.setup}-{content_key(job.root)}"
+    plan = training_plan(job.config, job.member)
+    return tune_twin(plan, job.config.tuning, windows, job.storage, study)
+
+
+def _track_trials(tracked: TrackedRun, setup: str, result: TuningResult) -> None:
+    for trial in result.trials:
+        name = f"{setup} trial {trial['number']}"
+        with tracked.child(name, {"setup": setup, "trial.state": trial["state"]}) as run:
+            run.params({k: v for k, v in trial.items() if "." in k})
+            if trial["validation_forecast_mse"] is not None:
+                run.metrics({"validation_forecast_mse": trial["validation_forecast_mse"]})

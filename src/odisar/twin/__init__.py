@@ -1,0 +1,1 @@
+"""The digital twin model (DTM): forecast, reconstruction, Monte Carlo dropout, training."""

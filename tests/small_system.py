@@ -1,0 +1,29 @@
+"""A small system whose recordings take no time to make: what most tests stand on."""
+
+import numpy as np
+
+from odisar.recordings.schema import Interval, Recording, RecordingInfo
+from odisar.seeding import generator
+from odisar.windows.windowing import WindowSpec
+
+SPEC = WindowSpec(context_steps=20, horizon_steps=10, outputs=(1, 2), known_ahead=())
+CHANNELS = ("Command", "Speed", "Turn Rate")
+
+
+def make_recording(name: str, samples: int = 300, push: float = 0.0) -> Recording:
+    """Return a damped system driven by a stepping command; ``push`` disturbs its middle third."""
+    random = generator(7, name)
+    command = np.repeat(random.choice([-1.0, 0.0, 1.0], samples // 15 + 1), 15)[:samples]
+    noise = random.normal(scale=0.02, size=(samples, 2))
+    states = np.zeros((samples, 2))
+    third = samples // 3
+    for i in range(1, samples):
+        disturbed = push if third <= i < 2 * third else 0.0
+        turn = 0.9 * states[i - 1, 1] + 0.1 * command[i - 1] + disturbed
+        speed = 0.95 * states[i - 1, 0] + 0.05 * (1 - turn**2) + disturbed
+        states[i] = speed, turn
+    values = np.column_stack([command, states + noise])
+    time_s = np.arange(samples, dtype=np.float64)
+    intervals = (Interval(float(third), float(2 * third), "push"),) if push else ()
+    info = RecordingInfo("system", disturbance="push" if push else "none", base_seed=name)
+    return Recording(name, info, time_s, values, intervals)
