@@ -1,39 +1,19 @@
 """Windows of a small system and a twin trained on them, made once a session."""
 
 import pytest
-from small_system import CHANNELS, SPEC, make_recording
 
-from odisar.config.learning import TrainingConfig, TwinConfig
 from odisar.twin.bundle import TrainedTwin
 from odisar.twin.mc_dropout import draw_masks
 from odisar.twin.training import TrainingPlan, train_twin, use_one_thread
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSet
+from small_system import CHANNELS, SPEC, make_recording, small_plan
 
 
 @pytest.fixture(scope="session")
 def plan() -> TrainingPlan:
     """Return a plan that trains in seconds."""
-    twin = TwinConfig(
-        patch_steps=5,
-        model_dim=16,
-        heads=2,
-        layers=1,
-        feedforward_dim=32,
-        reconstruction_dim=16,
-        dropout=0.1,
-        detach_reconstruction=False,
-    )
-    training = TrainingConfig(
-        batch_size=16,
-        learning_rate=3.0e-3,
-        epochs=3,
-        steps_per_epoch=40,
-        patience_epochs=3,
-        gradient_clip=1.0,
-        validation_stride_steps=10,
-    )
-    return TrainingPlan(twin, training, seed=11, accelerator="cpu")
+    return small_plan()
 
 
 @pytest.fixture(scope="session")

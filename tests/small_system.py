@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from odisar.config.learning import TrainingConfig, TwinConfig
 from odisar.recordings.schema import Interval, Recording, RecordingInfo
 from odisar.seeding import generator
+from odisar.twin.training import TrainingPlan
 from odisar.windows.windowing import WindowSpec
 
 SPEC = WindowSpec(context_steps=20, horizon_steps=10, outputs=(1, 2), known_ahead=())
@@ -27,3 +29,27 @@ def make_recording(name: str, samples: int = 300, push: float = 0.0) -> Recordin
     intervals = (Interval(float(third), float(2 * third), "push"),) if push else ()
     info = RecordingInfo("system", disturbance="push" if push else "none", base_seed=name)
     return Recording(name, info, time_s, values, intervals)
+
+
+def small_plan() -> TrainingPlan:
+    """Return a plan that trains in seconds."""
+    twin = TwinConfig(
+        patch_steps=5,
+        model_dim=16,
+        heads=2,
+        layers=1,
+        feedforward_dim=32,
+        reconstruction_dim=16,
+        dropout=0.1,
+        detach_reconstruction=False,
+    )
+    training = TrainingConfig(
+        batch_size=16,
+        learning_rate=3.0e-3,
+        epochs=3,
+        steps_per_epoch=40,
+        patience_epochs=3,
+        gradient_clip=1.0,
+        validation_stride_steps=10,
+    )
+    return TrainingPlan(twin, training, seed=11, accelerator="cpu")

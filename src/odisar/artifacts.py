@@ -119,7 +119,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
-    """Write a CSV with ``\\n`` line ends and six decimals; missing values stay empty."""
+    r"""Write a CSV with ``\n`` line ends and six decimals; missing values stay empty."""
     path.parent.mkdir(parents=True, exist_ok=True)
     table.round(_TABLE_DECIMALS).to_csv(path, index=False, lineterminator="\n")
 

@@ -4,7 +4,6 @@ import hashlib
 import json
 import subprocess
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
 from odisar.config.loader import Config, load_config
@@ -69,7 +68,11 @@ def track_recordings(root: Path, *, accept: bool) -> None:
 def run_dvc(root: Path, *arguments: str) -> str:
     """Return what a DVC command printed; raise OdisarError with its own words where it fails."""
     done = subprocess.run(
-        [sys.executable, "-m", "dvc", *arguments], cwd=root, capture_output=True, text=True
+        [sys.executable, "-m", "dvc", *arguments],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if done.returncode:
         words = (done.stderr or done.stdout).strip()
@@ -118,7 +121,7 @@ def _differs(status: dict[str, object]) -> bool:
     return "modified" in json.dumps(status) or "deleted" in json.dumps(status)
 
 
-def _findings(config: Config, root: Path) -> Iterable[Finding]:
+def _findings(config: Config, root: Path) -> list[Finding]:
     return [
         finding
         for name in config.active_cases

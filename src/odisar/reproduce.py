@@ -17,7 +17,14 @@ def reproduce(root: Path) -> None:
     make_recordings(root)
     track_recordings(root, accept=False)
     initialise_store(root)
-    done = subprocess.run([sys.executable, "-m", "dvc", "repro"], cwd=root)
+    # The pipeline says `python`: it must be this one, whether or not .venv is activated.
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    done = subprocess.run(
+        [sys.executable, "-m", "dvc", "repro"],
+        cwd=root,
+        env=os.environ | {"PATH": path},
+        check=False,
+    )
     if done.returncode:
         raise OdisarError("the pipeline stopped; what went wrong stands above")
     print_results(root)

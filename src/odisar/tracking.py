@@ -65,8 +65,8 @@ class TrackedRun:
         for start in range(0, len(flat), 100):
             self.client.log_batch(self.run_id, params=flat[start : start + 100])
 
-    def metrics(self, values: Mapping[str, float], step: int = 0) -> None:
-        """Log numbers, at an epoch where there is one."""
+    def metrics(self, values: Mapping[str, Any], step: int = 0) -> None:
+        """Log numbers, at an epoch where there is one; nested mappings get dotted names."""
         started = self.client.get_run(self.run_id).info.start_time
         batch = [Metric(k, float(v), started + step, step) for k, v in flatten(values).items()]
         for start in range(0, len(batch), 1000):

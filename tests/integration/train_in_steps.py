@@ -1,16 +1,17 @@
 """Train the small system's twin in a process of its own, to be killed by a test."""
 
+import dataclasses
 import sys
 import time
 from pathlib import Path
 
 import lightning as L
-from small_system import SPEC, make_recording
+from safetensors.torch import save_file
 
-from odisar.config.learning import TrainingConfig, TwinConfig
 from odisar.twin import training
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSet
+from small_system import SPEC, make_recording, small_plan
 
 
 class Slowly(L.Callback):
@@ -22,37 +23,18 @@ class Slowly(L.Callback):
 
 def main(checkpoints: Path) -> None:
     training.use_one_thread()
-    twin = TwinConfig(
-        patch_steps=5,
-        model_dim=16,
-        heads=2,
-        layers=1,
-        feedforward_dim=32,
-        reconstruction_dim=16,
-        dropout=0.2,
-        detach_reconstruction=False,
-    )
-    settings = TrainingConfig(
-        batch_size=8,
-        learning_rate=3.0e-3,
-        epochs=4,
-        steps_per_epoch=25,
-        patience_epochs=4,
-        gradient_clip=1.0,
-        validation_stride_steps=10,
+    plan = dataclasses.replace(
+        small_plan(), training=small_plan().training.model_copy(update={"epochs": 4})
     )
     train = [make_recording(f"train-{i}") for i in range(4)]
     scaler = Scaler.fit(train)
     validation = WindowSet([make_recording("v")], scaler, SPEC, stride_steps=10)
-    plan = training.TrainingPlan(twin, settings, seed=5, accelerator="cpu")
     if "--slowly" in sys.argv:
         build = training.build_trainer
         training.build_trainer = lambda plan, callbacks, plugins=(): build(
             plan, [Slowly(), *callbacks], plugins
         )
     result = training.train_twin(plan, WindowSet(train, scaler, SPEC), validation, checkpoints)
-    from safetensors.torch import save_file
-
     save_file(result.network.state_dict(), checkpoints / "final.safetensors")
     (checkpoints / "epochs.txt").write_text(str([row["epoch"] for row in result.history]))
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_system import make_recording
 
 from odisar.capability.scoring import DETECTORS, ODISAR, Scorer
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
+from small_system import make_recording
 
 SAMPLES = 120
 RECORDING = make_recording("causal", SAMPLES)

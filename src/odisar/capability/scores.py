@@ -1,9 +1,11 @@
 """Scores of a forecast window, from what the twin says at time t and from nothing later."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+FloatArray = NDArray[np.floating[Any]]
 
 
 def state_reconstruction_errors(forecast: FloatArray, reconstruction: FloatArray) -> FloatArray:
@@ -11,12 +13,12 @@ def state_reconstruction_errors(forecast: FloatArray, reconstruction: FloatArray
 
     ``forecast`` and ``reconstruction`` are (window, step, state). Paper, Eq. (rmse).
     """
-    return np.sqrt(np.mean((reconstruction - forecast) ** 2, axis=1))
+    return np.asarray(np.sqrt(np.mean((reconstruction - forecast) ** 2, axis=1)))
 
 
 def reconstruction_error(state_errors: FloatArray) -> FloatArray:
     """Return (window,) root mean square over steps and states, from the errors of each state."""
-    return np.sqrt(np.mean(state_errors**2, axis=1))
+    return np.asarray(np.sqrt(np.mean(state_errors**2, axis=1)))
 
 
 def predictive_variance(forecasts: FloatArray) -> FloatArray:

@@ -13,9 +13,9 @@ _DECIMALS = "%.6f"
 def write_recordings(
     folder: Path, recordings: Iterable[Recording], channel_names: Sequence[str]
 ) -> list[Path]:
-    """Write one CSV a recording, ``recordings.csv`` (metadata) and ``labels.csv`` (intervals).
+    r"""Write one CSV a recording, ``recordings.csv`` (metadata) and ``labels.csv`` (intervals).
 
-    Six decimals and ``\\n`` line ends, so that the bytes are equal on every machine that rounds
+    Six decimals and ``\n`` line ends, so that the bytes are equal on every machine that rounds
     the sixth decimal alike. Returns the files written.
     """
     folder.mkdir(parents=True, exist_ok=True)

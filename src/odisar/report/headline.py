@@ -1,5 +1,7 @@
 """The result in a table that fits a terminal."""
 
+from typing import Any
+
 import pandas as pd
 
 #: Metric in ``detection.csv``, heading, whether it is a share shown in percent.
@@ -44,10 +46,10 @@ def headline_text(detection: pd.DataFrame) -> str:
 
 
 def _cell(values: pd.DataFrame, metric: str, *, percent: bool) -> str:
-    if metric not in values.index or pd.isna(values.loc[metric, "value"]):
+    if metric not in values.index or values["value"].isna()[metric]:
         return "-"
     scale, digits = (100, 1) if percent else (1, 1)
-    row = values.loc[metric]
+    row: Any = values.loc[metric]
     text = f"{row['value'] * scale:.{digits}f}"
     if pd.isna(row["ci_low"]) or pd.isna(row["ci_high"]):
         return text

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -64,22 +65,23 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
             if job.member.setup == setup
         }
         content = setup_thresholds(config, setup, members)
-        write_json(workspace.thresholds(setup), content)
+        write_json(workspace.thresholds(setup), {"members": content})
         tracked.artifact(workspace.thresholds(setup))
-        tracked.metrics({f"{setup}.{k}": v for k, v in content["members"].items()})
+        tracked.metrics(content)
 
 
 def setup_thresholds(
     config: ConfigView, setup: str, members: dict[str, MemberCalibration]
-) -> dict[str, dict[str, object]]:
-    """Return the thresholds of a set-up's members, operating points included.
+) -> dict[str, dict[str, Any]]:
+    """Return the thresholds of a set-up's members by name, operating points included.
 
     A member with fewer hours than ``pool_below_hours`` takes its operating point from the pooled
     out-of-fold scores of all folds, in units of each fold's own threshold. Folds whose calibration
     recordings are this member's test recordings stay out of its pool.
     """
     point = config.evaluation.operating_point
-    content: dict[str, object] = {}
+    states = config.case_of(setup).output_names
+    content: dict[str, dict[str, Any]] = {}
     for name, member in members.items():
         pooled = member.hours < point.pool_below_hours and len(members) > 1
         pool = list(members.values()) if pooled else [member]
@@ -87,22 +89,17 @@ def setup_thresholds(
             detector: _operating_threshold(config, setup, detector, member, pool)
             for detector in member.sigma
         }
-        usable = [other.hours for other in pool if not _overlaps(other, member)]
         content[name] = {
             "thresholds": asdict(member.thresholds),
             "sigma": member.sigma,
             "operating": operating,
-            "operating_hours": sum(usable),
+            "operating_hours": sum(o.hours for o in pool if not _overlaps(o, member)),
             "operating_pooled": int(pooled),
             "calibration_hours": member.hours,
-            "state_low": dict(
-                zip(config.case_of(setup).output_names, member.state_low, strict=True)
-            ),
-            "state_high": dict(
-                zip(config.case_of(setup).output_names, member.state_high, strict=True)
-            ),
+            "state_low": dict(zip(states, member.state_low, strict=True)),
+            "state_high": dict(zip(states, member.state_high, strict=True)),
         }
-    return {"members": content}
+    return content
 
 
 def _operating_threshold(

@@ -110,9 +110,10 @@ def headline_metrics(detection: pd.DataFrame) -> dict[str, float]:
     rows = detection[(detection.protocol == "P2") & (detection.evaluated_on == "overall")]
     rows = rows[(rows.detector != "oracle") & rows.value.notna()]
     metrics: dict[str, float] = {}
-    for row in rows.itertuples():
-        strength = "" if pd.isna(row.strength) else f".s{float(row.strength):g}"
-        metrics[f"{row.setup}.{row.detector}{strength}.{row.metric}"] = round(float(row.value), 6)
+    for row in rows.to_dict("records"):
+        strength = "" if pd.isna(row["strength"]) else f".s{row['strength']:g}"
+        name = f"{row['setup']}.{row['detector']}{strength}.{row['metric']}"
+        metrics[name] = round(float(row["value"]), 6)
     return metrics
 
 
@@ -130,7 +131,10 @@ def _evaluate(job: _Job) -> _MemberResult:
     )
     short_lead = round(config.evaluation.short_lead_s * data.case.rate_hz)
     step_s = 1 / data.case.rate_hz
-    scored, frames, assessments, rows = [], [], [], []
+    scored: list[ScoredRecording] = []
+    frames: list[pd.DataFrame] = []
+    assessments: list[Assessment] = []
+    rows: list[dict[str, object]] = []
     for item in data.splits["test"]:
         scores = scorer.score(item, short_lead_steps=short_lead)
         by_detector = detector_scores(data.case, item, scores)

@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from odisar.artifacts import Workspace, read_json, write_json
 from odisar.config.loader import ConfigView
@@ -44,15 +45,12 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
             tracked.metrics(values, step=int(row["epoch"]))
         tracked.metrics({f"{name}.windows_seen": summary["windows_seen"]})
         tracked.artifact(workspace.twin(name), name)
-    write_json(workspace.train / "training.json", dict(zip(_names(jobs), summaries, strict=True)))
+    names = [job.member.name for job in jobs]
+    write_json(workspace.train / "training.json", dict(zip(names, summaries, strict=True)))
     shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _names(jobs: list[_Job]) -> list[str]:
-    return [job.member.name for job in jobs]
-
-
-def _train(job: _Job) -> dict[str, object]:
+def _train(job: _Job) -> dict[str, Any]:
     use_one_thread()
     workspace, member, config = Workspace(job.root), job.member, job.config
     data = load_member(config, workspace, member)

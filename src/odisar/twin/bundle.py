@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -55,7 +56,7 @@ def read_twin(folder: Path) -> TrainedTwin:
     try:
         description = json.loads((folder / _DESCRIPTION).read_text(encoding="utf-8"))
         config = TwinConfig.model_validate(description["config"])
-        spec = WindowSpec(**{k: _as_tuple(v) for k, v in description["spec"].items()})
+        spec = _read_spec(description["spec"])
         channel_names = tuple(description["channel_names"])
         network = TwinTransformer(config, spec, len(channel_names))
         network.load_state_dict(load_file(folder / _WEIGHTS))
@@ -68,5 +69,10 @@ def read_twin(folder: Path) -> TrainedTwin:
     return TrainedTwin(network.eval(), config, spec, scaler, masks, channel_names)
 
 
-def _as_tuple(value: int | list[int]) -> int | tuple[int, ...]:
-    return tuple(value) if isinstance(value, list) else value
+def _read_spec(values: dict[str, Any]) -> WindowSpec:
+    return WindowSpec(
+        context_steps=values["context_steps"],
+        horizon_steps=values["horizon_steps"],
+        outputs=tuple(values["outputs"]),
+        known_ahead=tuple(values["known_ahead"]),
+    )

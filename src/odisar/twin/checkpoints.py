@@ -32,7 +32,7 @@ class SafetensorsCheckpointIO(CheckpointIO):
         self,
         path: str | Path,
         map_location: object = None,
-        weights_only: bool | None = None,
+        weights_only: bool | None = None,  # noqa: FBT001 (Lightning's interface)
     ) -> dict[str, Any]:
         """Read a checkpoint; nothing in it can run code."""
         del map_location, weights_only

@@ -50,7 +50,7 @@ class Attention(nn.Module):
         return cast("torch.Tensor", self.out(attended.transpose(1, 2).flatten(2)))
 
     def _split(self, x: torch.Tensor) -> torch.Tensor:
-        return x.unflatten(-1, (self.heads, -1)).transpose(1, 2)
+        return x.view(*x.shape[:2], self.heads, -1).transpose(1, 2)
 
 
 class FeedForward(nn.Sequential):

@@ -74,7 +74,8 @@ def draw_forecasts(
         )
         output = network.decode(memory, repeated[:, -1], known_future.repeat(draws, 1, 1))
     return TwinOutput(
-        output.forecast.unflatten(0, (draws, -1)), output.reconstruction.unflatten(0, (draws, -1))
+        output.forecast.reshape(draws, len(context), *output.forecast.shape[1:]),
+        output.reconstruction.reshape(draws, len(context), *output.reconstruction.shape[1:]),
     )
 
 

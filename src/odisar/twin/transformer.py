@@ -64,8 +64,7 @@ class TwinTransformer(nn.Module):
 
     def encode(self, context: torch.Tensor) -> torch.Tensor:
         """Return memory (window, context token, feature) from context (window, step, channel)."""
-        tokens = context.unflatten(1, (-1, self.patch_steps)).flatten(2)
-        x = self.embed_dropout(self.embed(tokens) + self.context_position)
+        x = self.embed_dropout(self.embed(self._patch(context)) + self.context_position)
         for layer in self.encoder:
             x = layer(x)
         return cast("torch.Tensor", self.memory_norm(x))
@@ -80,7 +79,7 @@ class TwinTransformer(nn.Module):
         """
         x = self.query + self.embed_last(last)[:, None]
         if self.embed_known is not None:
-            x = x + self.embed_known(known_future.unflatten(1, (-1, self.patch_steps)).flatten(2))
+            x = x + self.embed_known(self._patch(known_future))
         for layer in self.decoder:
             x = cast("DecoderLayer", layer).decode(x, memory)
         x = self.output_norm(x)
@@ -92,5 +91,10 @@ class TwinTransformer(nn.Module):
         """Run encoder and decoder on context (window, context step, channel), scaled."""
         return self.decode(self.encode(context), context[:, -1], known_future)
 
+    def _patch(self, steps: torch.Tensor) -> torch.Tensor:
+        """Return (window, token, patch step x channel) from (window, step, channel)."""
+        return steps.reshape(len(steps), -1, self.patch_steps * steps.shape[2])
+
     def _unpatch(self, patches: torch.Tensor) -> torch.Tensor:
-        return patches.unflatten(2, (self.patch_steps, -1)).flatten(1, 2)
+        """Return (window, step, state) from (window, token, patch step x state)."""
+        return patches.reshape(len(patches), -1, len(self.spec.outputs))

@@ -1,5 +1,6 @@
 """Batches for training: which windows an epoch draws depends on the seed and its number alone."""
 
+import math
 from collections.abc import Iterator
 
 import lightning as L
@@ -51,10 +52,11 @@ class OrderedSampler(Sampler[torch.Tensor]):
         self._windows, self._batch_size = windows, batch_size
 
     def __len__(self) -> int:
-        return -(-self._windows // self._batch_size)
+        return math.ceil(self._windows / self._batch_size)
 
     def __iter__(self) -> Iterator[torch.Tensor]:
-        yield from torch.arange(self._windows).split(self._batch_size)
+        for start in range(0, self._windows, self._batch_size):
+            yield torch.arange(start, min(start + self._batch_size, self._windows))
 
 
 class WindowDataModule(L.LightningDataModule):

@@ -3,7 +3,6 @@ import json
 import jsonschema
 import numpy as np
 import pytest
-from small_system import make_recording
 
 from odisar.capability.assessment import (
     Capability,
@@ -22,6 +21,7 @@ from odisar.capability.scoring import Scorer
 from odisar.capability.thresholds import sigma_threshold
 from odisar.errors import OdisarError
 from odisar.recordings.schema import Recording
+from small_system import make_recording
 
 
 def assess(trained_twin, thresholds, recording=None):
@@ -120,7 +120,7 @@ def test_an_assessment_that_is_no_number_is_refused(trained_twin):
     values = recording.values.copy()
     values[50:90] = np.nan
     broken = Recording("nan", recording.info, recording.time_s, values)
-    with pytest.raises(OdisarError, match="no number|does not fit"):
+    with pytest.raises(OdisarError, match=r"no number|does not fit"):
         assessments_json(assess(trained_twin, Thresholds(0.1, 0.01), broken))
 
 

@@ -1,9 +1,9 @@
 import torch
-from small_system import SPEC
 
 from odisar.config.learning import TwinConfig
 from odisar.twin.transformer import TwinTransformer
 from odisar.windows.windowing import WindowSpec
+from small_system import SPEC
 
 
 def network(spec: WindowSpec = SPEC, patch_steps: int = 5) -> TwinTransformer:

@@ -1,11 +1,11 @@
 import numpy as np
 import torch
-from small_system import SPEC, make_recording
 
 from odisar.recordings.schema import Recording
 from odisar.windows.nearness import nearness_table
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSet
+from small_system import SPEC, make_recording
 
 
 def counted(samples: int, first: int, segments: tuple[tuple[int, int], ...] = ()) -> Recording:
