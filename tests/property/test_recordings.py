@@ -38,6 +38,7 @@ def make_case(splits=None, faults=None):
         splits={"kind": "metadata", "fractions": None, "folds": None, "block_s": None,
                 "block_gap_s": None} | (splits or {}),
         persistence_s=1.0,
+        short_lead_s=0.5,
         guard_start_s=10.0,
         guard_end_s=10.0,
         groups={"overall": {}, "group_by": [], "apart": []},

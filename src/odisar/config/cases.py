@@ -134,6 +134,7 @@ class Case(Section):
     window: WindowConfig
     splits: Splits
     persistence_s: PositiveFloat
+    short_lead_s: PositiveFloat
     guard_start_s: PositiveFloat
     guard_end_s: PositiveFloat
     groups: Groups
@@ -146,6 +147,12 @@ class Case(Section):
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise ValueError(f"channels: {', '.join(repeated)} declared more than once")
+        short_lead_steps = round(self.short_lead_s * self.rate_hz)
+        if not 1 <= short_lead_steps <= self.window.horizon_steps:
+            raise ValueError(
+                f"short_lead_s={self.short_lead_s} is {short_lead_steps} steps; it must be "
+                f"between 1 and horizon_steps={self.window.horizon_steps}"
+            )
         if not self.output_names:
             raise ValueError("channels: at least one state needs output: true")
         mentioned = [rule.channel for rule in self.range_rules]
@@ -154,6 +161,11 @@ class Case(Section):
             if name not in names:
                 raise ValueError(f"{name!r} is not one of the channels: {', '.join(names)}")
         return self
+
+    @property
+    def short_lead_steps(self) -> int:
+        """Lead of the second forecast-error baseline in steps."""
+        return round(self.short_lead_s * self.rate_hz)
 
     @property
     def channel_names(self) -> list[str]:

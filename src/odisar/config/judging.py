@@ -7,6 +7,8 @@ from pydantic import Field
 from odisar.config.base import Section
 from odisar.config.cases import Case, PositiveFloat, PositiveInt
 
+_GUARDS = ("guard_start_s", "guard_end_s")
+
 
 class CapabilityConfig(Section):
     """Monte Carlo dropout, thresholds and attribution (paper, section "Creating DTC")."""
@@ -30,7 +32,6 @@ class EvaluationConfig(Section):
     """Protocols and intervals."""
 
     consequence_s: PositiveFloat
-    short_lead_s: PositiveFloat
     bootstrap_draws: PositiveInt
     bootstrap_bins: PositiveInt
     confidence: Annotated[float, Field(gt=0, lt=1)]
@@ -38,13 +39,14 @@ class EvaluationConfig(Section):
 
 
 class Judging(EvaluationConfig):
-    """The evaluation of one case: the section, and the case's own guards."""
+    """The evaluation of one case: the section, and the case's own times."""
 
+    short_lead_s: PositiveFloat
     guard_start_s: PositiveFloat
     guard_end_s: PositiveFloat
 
     @classmethod
     def of(cls, evaluation: EvaluationConfig, case: Case) -> Self:
         """Return how a case is judged."""
-        guards = {"guard_start_s": case.guard_start_s, "guard_end_s": case.guard_end_s}
-        return cls.model_validate({**evaluation.model_dump(), **guards})
+        times = {name: getattr(case, name) for name in ("short_lead_s", *_GUARDS)}
+        return cls.model_validate({**evaluation.model_dump(), **times})

@@ -134,9 +134,10 @@ def _calibrate(job: _Job) -> MemberCalibration:
     data = load_member(config, workspace, job.member)
     twin = read_twin(workspace.twin(job.member.name))
     scorer = Scorer(twin, config.capability.scoring_batch, pick_device(config.pipeline.accelerator))
-    short_lead = round(config.evaluation.short_lead_s * data.case.rate_hz)
     calibration = data.splits["calibration"]
-    scored = [scorer.score(item, short_lead_steps=short_lead) for item in calibration]
+    scored = [
+        scorer.score(item, short_lead_steps=data.case.short_lead_steps) for item in calibration
+    ]
     runs = _score_runs(data, calibration, scored)
     sigma = {
         detector: sigma_threshold(

@@ -1,5 +1,6 @@
 """Score the test recordings, assess the reported windows, judge every detector."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +34,13 @@ from odisar.twin.training import use_one_thread
 from odisar.windows.nearness import nearness_table
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "evaluation")
+
+
+#: Metrics, by detector, that a change of parameters is compared by.
+_HEADLINE = {
+    "odisar": ("auroc", "tnr_at_tpr95", "f1_ood", "false_alarms_per_hour", "events_detected"),
+    "rmse": ("auroc",),
+}
 
 
 @dataclass(frozen=True)
@@ -75,9 +83,8 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     for name, table in tables.items():
         write_table(workspace.results / f"{name}.csv", table)
         tracked.artifact(workspace.results / f"{name}.csv", "results")
-    metrics = headline_metrics(tables["detection"])
-    write_json(workspace.metrics, metrics)
-    tracked.metrics(metrics)
+    tracked.metrics(monitor_metrics(tables["detection"]))
+    write_json(workspace.metrics, monitor_metrics(tables["detection"], _HEADLINE))
 
 
 def result_tables(
@@ -105,9 +112,17 @@ def result_tables(
     return {key: pd.concat(parts, ignore_index=True) for key, parts in tables.items()}
 
 
-def headline_metrics(detection: pd.DataFrame) -> dict[str, float]:
-    """Return the monitor's overall numbers by dotted name, for ``dvc metrics`` and MLflow."""
+def monitor_metrics(
+    detection: pd.DataFrame, only: Mapping[str, Sequence[str]] | None = None
+) -> dict[str, float]:
+    """Return the overall numbers of protocol P2 by dotted name.
+
+    ``only`` narrows them to some metrics of some detectors: ``dvc metrics`` shows one row.
+    """
     rows = detection[(detection.protocol == "P2") & (detection.evaluated_on == "overall")]
+    if only is not None:
+        wanted = [m in only.get(d, ()) for d, m in zip(rows.detector, rows.metric, strict=True)]
+        rows = rows[wanted]
     rows = rows[(rows.detector != "oracle") & rows.value.notna()]
     metrics: dict[str, float] = {}
     for row in rows.to_dict("records"):
@@ -129,14 +144,13 @@ def _evaluate(job: _Job) -> _MemberResult:
         Thresholds(**limits["thresholds"]),
         attribution_top=config.capability.attribution_top,
     )
-    short_lead = round(config.evaluation.short_lead_s * data.case.rate_hz)
     step_s = 1 / data.case.rate_hz
     scored: list[ScoredRecording] = []
     frames: list[pd.DataFrame] = []
     assessments: list[Assessment] = []
     rows: list[dict[str, object]] = []
     for item in data.splits["test"]:
-        scores = scorer.score(item, short_lead_steps=short_lead)
+        scores = scorer.score(item, short_lead_steps=data.case.short_lead_steps)
         by_detector = detector_scores(data.case, item, scores)
         times = item.time_s[scores.positions]
         scored.append(

@@ -46,6 +46,7 @@ def case_values() -> dict[str, Any]:
             "block_gap_s": None,
         },
         "persistence_s": 2.0,
+        "short_lead_s": 1.0,
         "guard_start_s": 10.0,
         "guard_end_s": 10.0,
         "groups": {"overall": {}, "group_by": [], "apart": []},

@@ -40,7 +40,6 @@ def test_each_fault_gives_a_copy_that_says_what_it_is(copies):
         assert copy.info.maneuver == "turning"
         assert copy.info.split == "test"
         assert copy.info.extra["fault_channel"] == "Speed"
-        assert copy.info.extra["fault_delay_s"] == ("3.0" if kind == "delay" else "")
 
 
 def test_the_interval_fits_and_outside_it_nothing_changes(copies):

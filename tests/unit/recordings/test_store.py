@@ -27,7 +27,7 @@ def test_the_table_can_be_read_without_this_package(tmp_path, recordings):
     table = pd.read_parquet(tmp_path / SAMPLES_FILE)
     assert list(table.columns) == ["recording", "time_s", "Rudder", "Speed", "Heading"]
     assert table["recording"].tolist() == ["a"] * 30 + ["b"] * 5
-    np.testing.assert_array_equal(table["Speed"][:30], recordings[0].values[:, 1])  # noqa: PD011 - a recording
+    np.testing.assert_array_equal(table["Speed"][:30], recordings[0].values[:, 1])
 
 
 def test_no_recordings_at_all(tmp_path):

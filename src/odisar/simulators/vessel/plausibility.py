@@ -151,5 +151,5 @@ def _largest_roll_deg(config: VesselSimulatorConfig, base_seed: int) -> float:
         for case in ("case-1", "case-2", "case-3")
     ]
     roll = CHANNELS.index("Roll Angle")
-    logged = [recording.values for recording in simulate_runs(plans, config, base_seed)]  # noqa: PD011
+    logged = [recording.values for recording in simulate_runs(plans, config, base_seed)]
     return float(np.max(np.abs(np.stack(logged)[:, :, roll])))
