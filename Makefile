@@ -30,8 +30,8 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) with $$($(PYTHON) --version) (a few minutes the first time) ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip show --quiet torch 2>/dev/null || \
-		$(BIN)/python -m pip install --quiet --no-deps --retries 1 --extra-index-url $(TORCH_INDEX) "$(TORCH)"
-	@$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --retries 1 --extra-index-url $(TORCH_INDEX) "$(TORCH)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	@$(BIN)/python -c 'import torch; print("torch", torch.__version__, "- GPU:", torch.cuda.is_available())'
 	@touch $(INSTALLED)
 

@@ -9,6 +9,7 @@ from odisar.artifacts import Workspace, read_table
 from odisar.errors import OdisarError
 from odisar.making import make_recordings, run_dvc, track_recordings
 from odisar.report.headline import headline_text
+from odisar.stages.publish import ensure_published
 from odisar.tracking import ROOT_VARIABLE, initialise_store, tracking_root
 
 
@@ -27,6 +28,7 @@ def reproduce(root: Path) -> None:
     )
     if done.returncode:
         raise OdisarError("the pipeline stopped; what went wrong stands above")
+    ensure_published(root)
     print_results(root)
 
 

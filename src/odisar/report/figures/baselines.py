@@ -1,0 +1,212 @@
+"""The capability beside forecast-error baselines: by strength, by scenario, by protocol."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from odisar.report.load import OVERALL, Results
+from odisar.report.style import (
+    METRIC_NAMES,
+    ORACLE,
+    detector_colour,
+    detector_marker,
+    detector_name,
+    figure_style,
+    strength_name,
+)
+
+METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
+PROTOCOL_NAMES = {
+    "P1": "P1",
+    "P2": "P2",
+    "P2-guarded": "P2\nguarded",
+    "proactive": "pro-\nactive",
+}
+
+
+def baselines_by_strength(results: Results, setup: str) -> Figure:
+    """Draw every detector's metrics over the strength of the disturbance (P2, overall)."""
+    rows = _rows(results, setup, "P2")
+    rows = rows[rows.evaluated_on == OVERALL]
+    strengths = results.strengths(setup)
+    labels = [strength_name(strength) for strength in strengths]
+    rows = rows.assign(place=[_place(strengths, strength) for strength in rows.strength])
+    title = "strength of the disturbance" if len(strengths) > 1 else "recordings"
+    return _by_metric(results, setup, rows, labels, title)
+
+
+def baselines_by_scenario(results: Results, setup: str) -> Figure:
+    """Draw every detector's metrics in each scenario at the greatest strength (P2)."""
+    scenarios = results.scenarios(setup)
+    names = list(scenarios[~scenarios.is_apart].evaluated_on)
+    rows = _strongest(_rows(results, setup, "P2"), results, setup)
+    rows = rows[rows.evaluated_on.isin(names)]
+    rows = rows.assign(place=[names.index(name) for name in rows.evaluated_on])
+    return _by_metric(results, setup, rows, names, "", upright=False)
+
+
+def protocols(results: Results, setup: str) -> Figure:
+    """Draw every detector and the oracle under each protocol, at the greatest strength."""
+    rows = _strongest(_rows(results, setup, None), results, setup)
+    rows = rows[rows.evaluated_on == OVERALL]
+    names = [name for name in PROTOCOL_NAMES if name in set(rows.protocol)]
+    rows = rows.assign(place=[names.index(name) for name in rows.protocol])
+    # Published values stand beside two protocols in the table; they belong to the paper's.
+    rows.loc[rows.protocol != "P1", "published"] = np.nan
+    return _by_metric(results, setup, rows, [PROTOCOL_NAMES[name] for name in names], "")
+
+
+def components_apart(results: Results, setup: str) -> Figure:
+    """Draw what was set apart (one component of the weather, novel regimes) beside the whole."""
+    scenarios = results.scenarios(setup)
+    apart = list(scenarios[scenarios.is_apart].evaluated_on)
+    rows = _rows(results, setup, "P2")
+    strengths = rows[rows.evaluated_on.isin(apart)].strength.unique()
+    same = rows.strength.isin(strengths) | rows.strength.isna()
+    rows = rows[same & rows.evaluated_on.isin([OVERALL, *apart])]
+    names = [name for name in (OVERALL, *apart) if name in set(rows.evaluated_on)]
+    rows = rows.assign(place=[names.index(name) for name in rows.evaluated_on], published=np.nan)
+    at = ", ".join(strength_name(s) for s in strengths if pd.notna(s))
+    return _by_metric(results, setup, rows, names, f"strength {at}" if at else "")
+
+
+def has_components(results: Results, setup: str) -> bool:
+    """Whether anything was set apart in a set-up."""
+    return bool(results.scenarios(setup).is_apart.any())
+
+
+def has_groups(results: Results, setup: str) -> bool:
+    """Whether a set-up was judged by scenario."""
+    return len(results.scenarios(setup)) > 1
+
+
+def _rows(results: Results, setup: str, protocol: str | None) -> pd.DataFrame:
+    rows = results.detection
+    rows = rows[(rows.setup == setup) & rows.metric.isin(METRICS)]
+    return rows if protocol is None else rows[rows.protocol == protocol]
+
+
+def _strongest(rows: pd.DataFrame, results: Results, setup: str) -> pd.DataFrame:
+    strongest = results.strengths(setup)[-1]
+    return rows[rows.strength.isna() if pd.isna(strongest) else rows.strength == strongest]
+
+
+def _place(strengths: Sequence[float], strength: float) -> int:
+    if pd.isna(strength):
+        return 0
+    return list(strengths).index(strength)
+
+
+def _by_metric(
+    results: Results,
+    setup: str,
+    rows: pd.DataFrame,
+    labels: Sequence[str],
+    title: str,
+    *,
+    upright: bool = True,
+) -> Figure:
+    """Draw a panel for each metric: ``rows`` have a ``place`` on the common axis of labels."""
+    detectors = [*results.detectors(setup), ORACLE]
+    with figure_style():
+        if upright:
+            figure = Figure(figsize=(9.6, 3.3))
+            grid = figure.subplots(1, len(METRICS), sharey=True)
+        else:
+            figure = Figure(figsize=(9.6, 0.42 * len(labels) + 1.5))
+            grid = figure.subplots(1, len(METRICS), sharey=True)
+        for axes, metric in zip(grid, METRICS, strict=True):
+            _panel(axes, rows[rows.metric == metric], detectors, upright=upright)
+            axes.set_title(METRIC_NAMES[metric])
+            _label(axes, labels, upright=upright)
+        _finish(figure, list(grid), title, upright=upright)
+        _legend(figure, detectors, has_published=bool(rows.published.notna().any()))
+    return figure
+
+
+def _panel(axes: Axes, rows: pd.DataFrame, detectors: Sequence[str], *, upright: bool) -> None:
+    width = 0.74 / len(detectors)
+    for number, detector in enumerate(detectors):
+        own = rows[(rows.detector == detector) & rows.value.notna()]
+        if own.empty:
+            continue
+        at = own.place.to_numpy() + (number - (len(detectors) - 1) / 2) * width
+        values = 100 * own.value.to_numpy()
+        below = 100 * (own.value - own.ci_low.fillna(own.value)).clip(lower=0).to_numpy()
+        above = 100 * (own.ci_high.fillna(own.value) - own.value).clip(lower=0).to_numpy()
+        colour = detector_colour(detector, detectors)
+        style: dict[str, Any] = {
+            "fmt": detector_marker(detector, detectors),
+            "color": colour,
+            "markersize": 4.5,
+            "elinewidth": 1.3,
+            "capsize": 0,
+        }
+        published = 100 * own.published.to_numpy(dtype=float)
+        hollow: dict[str, Any] = {"s": 46, "facecolor": "none", "edgecolor": colour, "marker": "D"}
+        if upright:
+            axes.errorbar(at, values, yerr=[below, above], **style)
+            axes.scatter(at, published, **hollow)
+        else:
+            axes.errorbar(values, at, xerr=[below, above], **style)
+            axes.scatter(published, at, **hollow)
+
+
+def _label(axes: Axes, labels: Sequence[str], *, upright: bool) -> None:
+    if upright:
+        axes.set_xticks(range(len(labels)), labels)
+        axes.set_xlim(-0.55, len(labels) - 0.45)
+        axes.set_ylim(-3, 103)
+        axes.grid(visible=False, axis="x")
+    else:
+        axes.set_yticks(range(len(labels)), labels)
+        axes.set_ylim(len(labels) - 0.45, -0.55)
+        axes.set_xlim(-3, 103)
+        axes.grid(visible=False, axis="y")
+    borders = np.arange(len(labels) - 1) + 0.5
+    for border in borders:
+        line = axes.axvline if upright else axes.axhline
+        line(border, color="#d0d0d0", linewidth=0.6)
+
+
+def _finish(figure: Figure, grid: Sequence[Axes], title: str, *, upright: bool) -> None:
+    if upright:
+        grid[0].set_ylabel("percent, 95 % interval")
+        if title:
+            figure.supxlabel(title, fontsize=9)
+    else:
+        figure.supxlabel("percent, 95 % interval", fontsize=9)
+
+
+def _legend(figure: Figure, detectors: Sequence[str], *, has_published: bool) -> None:
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=detector_colour(detector, detectors),
+            marker=detector_marker(detector, detectors),
+            markersize=5,
+            linewidth=1.3,
+            label=detector_name(detector),
+        )
+        for detector in detectors
+    ]
+    if has_published:
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color="black",
+                marker="D",
+                markerfacecolor="none",
+                linewidth=0,
+                markersize=6.5,
+                label="published, same colour",
+            )
+        )
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)

@@ -1,0 +1,240 @@
+"""One event from the inside: forecasts, the score over time, and the states it blames."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from odisar.report.load import Results, rows_of
+from odisar.report.style import (
+    EVENT_COLOUR,
+    QUADRANT_COLOURS,
+    QUADRANT_HATCHES,
+    figure_style,
+    shade_events,
+    strength_name,
+)
+
+_FORECAST, _RECONSTRUCTION, _TRUTH = "#D55E00", "#009E73", "#222222"
+
+
+def forecast_examples(results: Results, setup: str) -> Figure:
+    """Draw forecasts on the disturbed example beside what came true, in physical units."""
+    case = results.config.setups[setup].case
+    example = results.examples.chosen[case]["disturbed"]
+    forecasts = results.examples.forecasts
+    forecasts = forecasts[forecasts.setup == setup]
+    states = list(dict.fromkeys(forecasts.state))
+    issued = sorted(forecasts.issued_s.unique())
+    traces = results.examples.traces
+    traces = traces[(traces.case == case) & (traces.recording == example["recording"])]
+    window = results.case_of(setup).window
+    context_s = window.context_steps / results.case_of(setup).rate_hz
+    with figure_style():
+        figure = Figure(figsize=(3.2 * len(issued) + 0.5, 1.15 * len(states) + 1.2))
+        grid = figure.subplots(len(states), len(issued), sharey="row", sharex="col", squeeze=False)
+        for column, issued_s in enumerate(issued):
+            here = forecasts[forecasts.issued_s == issued_s]
+            for row, state in enumerate(states):
+                axes = grid[row][column]
+                trace = traces[(traces.channel == state) & (traces.time_s >= issued_s - context_s)]
+                trace = trace[trace.time_s <= here.time_s.max()]
+                _forecast(axes, here[here.state == state], trace, issued_s)
+                shade_events(axes, _inside(example["events"], trace))
+                if column == 0:
+                    unit = example["units"][state]
+                    axes.set_ylabel(f"{state.replace(' ', chr(10), 1)}\n[{unit}]")
+            axes.set_xlim((issued_s - context_s) / 60, float(here.time_s.max()) / 60)
+            grid[0][column].set_title(f"issued at {issued_s / 60:.1f} min")
+            grid[-1][column].set_xlabel("time [min]")
+        figure.align_ylabels()
+        _forecast_legend(figure)
+    return figure
+
+
+def _inside(events: list[list[float]], trace: pd.DataFrame) -> list[tuple[float, float]]:
+    first, last = float(trace.time_s.min()), float(trace.time_s.max())
+    cut = [(max(start, first), min(end, last)) for start, end in events]
+    return [(start, end) for start, end in cut if end > start]
+
+
+def _forecast(axes: Axes, forecast: pd.DataFrame, trace: pd.DataFrame, issued_s: float) -> None:
+    minutes = forecast.time_s.to_numpy() / 60
+    axes.plot(trace.time_s.to_numpy() / 60, trace.value.to_numpy(), color=_TRUTH, linewidth=0.8)
+    axes.fill_between(
+        minutes, forecast.low, forecast.high, color=_FORECAST, alpha=0.25, linewidth=0
+    )
+    axes.plot(minutes, forecast.forecast, color=_FORECAST, linewidth=1.3)
+    axes.plot(minutes, forecast.reconstruction, color=_RECONSTRUCTION, linewidth=1.1, ls="--")
+    axes.axvline(issued_s / 60, color="black", linewidth=0.7, linestyle=":")
+
+
+def _forecast_legend(figure: Figure) -> None:
+    handles = [
+        Line2D([], [], color=_TRUTH, linewidth=0.9, label="recorded"),
+        Line2D([], [], color=_FORECAST, linewidth=1.3, label="forecast"),
+        Patch(facecolor=_FORECAST, alpha=0.25, label="5-95 % of Monte Carlo draws"),
+        Line2D([], [], color=_RECONSTRUCTION, ls="--", label="reconstruction of the forecast"),
+        Patch(facecolor=EVENT_COLOUR, alpha=0.55, label="event"),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
+
+
+def event_attribution(results: Results, setup: str) -> Figure:
+    """Draw the score over the disturbed example and the states blamed in its flagged windows."""
+    case = results.config.setups[setup].case
+    example = results.examples.chosen[case]["disturbed"]
+    scores = results.scores(setup)
+    scores = scores[scores.recording == example["recording"]]
+    known = results.examples.recordings
+    member = known[(known.setup == setup) & (known.recording == example["recording"])].member.iloc[
+        0
+    ]
+    limits = results.limits(setup)[member]
+    windows = results.assessments(setup)
+    windows = windows[windows.recording == example["recording"]]
+    with figure_style():
+        figure = Figure(figsize=(8.4, 4.6))
+        score, strip, blame = figure.subplots(
+            3, 1, sharex=True, gridspec_kw={"height_ratios": [3, 0.35, 2]}
+        )
+        score.plot(scores.time_s / 60, scores.odisar, color="#0072B2", linewidth=0.9, label="score")
+        score.axhline(limits["sigma"]["odisar"], color="black", ls="--", lw=0.9, label="threshold")
+        score.axhline(
+            limits["operating"]["odisar"], color="#777777", ls=":", lw=1.1, label="alarm threshold"
+        )
+        shade_events(score, example["events"])
+        score.set_ylabel("reconstruction error\n[scaled units]")
+        score.legend(loc="upper left", ncols=4)
+        top = max(float(scores.odisar.max()), limits["sigma"]["odisar"])
+        score.set_ylim(0, 1.22 * max(top, limits["operating"]["odisar"]))
+        score.set_title(f"{example['recording']}, set-up {setup}")
+        _quadrant_strip(strip, windows)
+        _blame(blame, windows, results.case_of(setup).output_names, figure)
+        blame.set_xlabel("time [min]")
+    return figure
+
+
+def _quadrant_strip(axes: Axes, windows: pd.DataFrame) -> None:
+    for row in rows_of(windows):
+        axes.axvspan(
+            row.issued_s / 60,
+            row.end_s / 60,
+            facecolor=QUADRANT_COLOURS[row.category],
+            hatch=QUADRANT_HATCHES[row.category],
+            edgecolor="white",
+            linewidth=0.3,
+        )
+    axes.set_yticks([])
+    axes.set_ylabel("quadrant", rotation=0, ha="right", va="center")
+    axes.grid(visible=False)
+
+
+def _blame(axes: Axes, windows: pd.DataFrame, states: list[str], figure: Figure) -> None:
+    """Draw a cell for each blamed state and window, darker for the more abnormal."""
+    values = np.full((len(states), len(windows)), np.nan)
+    for column, blamed in enumerate(windows.state_attribution):
+        for state, error in blamed.items():
+            values[states.index(state), column] = error
+    if len(windows):
+        edges = np.append(windows.issued_s.to_numpy(), windows.end_s.iloc[-1]) / 60
+        mesh = axes.pcolormesh(
+            edges, np.arange(len(states) + 1) - 0.5, np.ma.masked_invalid(values), cmap="cividis_r"
+        )
+        if np.isfinite(values).any():
+            figure.colorbar(mesh, ax=axes, label="error of state\n[scaled units]", pad=0.01)
+        else:
+            centre: dict[str, Any] = {"ha": "center", "va": "center", "color": "#777777"}
+            axes.text(0.5, 0.5, "no window was flagged", transform=axes.transAxes, **centre)
+    axes.set_yticks(range(len(states)), states)
+    axes.set_ylim(len(states) - 0.5, -0.5)
+    axes.grid(visible=False)
+
+
+def attribution_shares(results: Results, setup: str) -> Figure:
+    """Draw how often each state comes first and among the first three, at the greatest strength."""
+    table = results.attribution[results.attribution.setup == setup]
+    strongest = results.strengths(setup)[-1]
+    same = table.strength.isna() if pd.isna(strongest) else table.strength == strongest
+    scenarios = results.scenarios(setup)
+    apart = list(scenarios[scenarios.is_apart].evaluated_on)
+    table = table[same | table.evaluated_on.isin(apart)]
+    names = [name for name in scenarios.evaluated_on if name in set(table.evaluated_on)]
+    states = [name for name in results.case_of(setup).output_names if name in set(table.state)]
+    with figure_style():
+        figure = Figure(figsize=(8.4, 0.3 * max(len(names), 2) + 1.6))
+        grid = figure.subplots(1, 2, sharey=True)
+        for axes, column, title in zip(
+            grid, ("top_1", "top_3"), ("named first", "among the first three"), strict=True
+        ):
+            shares = table.pivot_table(index="evaluated_on", columns="state", values=column)
+            _heat(axes, 100 * shares.reindex(index=names, columns=states))
+            axes.set_title(f"{title} [% of flagged windows]")
+        at = "" if pd.isna(strongest) else f"strength {strength_name(strongest)}"
+        figure.supylabel(at, fontsize=9)
+    return figure
+
+
+def _heat(axes: Axes, shares: pd.DataFrame) -> None:
+    values = shares.to_numpy(dtype=float)
+    axes.imshow(values, aspect="auto", cmap="Blues", vmin=0, vmax=100)
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = "white" if value > 60 else "black"
+            axes.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, size=7)
+    axes.set_xticks(range(values.shape[1]), list(shares.columns), rotation=20, ha="right")
+    axes.set_yticks(range(values.shape[0]), list(shares.index))
+    axes.grid(visible=False)
+
+
+def has_flagged(results: Results, setup: str) -> bool:
+    """Whether any window of a set-up was flagged, so that there is something to attribute."""
+    return bool((results.attribution.setup == setup).any())
+
+
+def has_faults(results: Results, setup: str) -> bool:
+    """Whether a set-up was judged on injected sensor faults."""
+    return results.case_of(setup).faults is not None
+
+
+def fault_heat_map(results: Results, setup: str) -> Figure:
+    """Draw the share of faulty time above the threshold, by kind, size and channel of the fault."""
+    shares = fault_shares(results, setup)
+    with figure_style():
+        figure = Figure(figsize=(7.0, 0.3 * len(shares) + 1.3))
+        axes = figure.subplots()
+        _heat(axes, 100 * shares)
+        axes.set_title("faulty seconds with a score above the threshold [%]")
+        axes.set_ylabel("fault and size")
+        axes.set_xlabel("faulty channel")
+    return figure
+
+
+def fault_shares(results: Results, setup: str) -> pd.DataFrame:
+    """Return the flagged share of faulty time: rows kind and size, columns channel."""
+    known = results.examples.recordings
+    known = known[(known.setup == setup) & known.is_disturbed & (known.fault_channel != "")]
+    limits = results.limits(setup)
+    scores = dict(list(results.scores(setup).groupby("recording", sort=False)))
+    rows = []
+    for one in rows_of(known):
+        own = scores[one.recording]
+        active = pd.Series(data=False, index=own.index)
+        for start, end in json.loads(str(one.events)):
+            active |= (own.time_s >= start) & (own.time_s < end)
+        flagged = own.odisar[active] > limits[one.member]["sigma"]["odisar"]
+        name = f"{one.disturbance} {one.fault_size}".strip()
+        rows.append((name, one.fault_channel, flagged.sum(), active.sum()))
+    table = pd.DataFrame(rows, columns=["fault", "channel", "flagged", "seconds"])
+    summed = table.groupby(["fault", "channel"], sort=True)[["flagged", "seconds"]].sum()
+    return (
+        (summed.flagged / summed.seconds)
+        .rename("share")
+        .reset_index()
+        .pivot_table(index="fault", columns="channel", values="share")
+    )

@@ -1,0 +1,189 @@
+"""The four confidence quadrants: how often, and where every window lies."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from odisar.report.load import Results
+from odisar.report.style import (
+    QUADRANT_COLOURS,
+    QUADRANT_HATCHES,
+    QUADRANT_NAMES,
+    QUADRANTS,
+    figure_style,
+    strength_name,
+)
+
+#: Shares below this are too narrow to carry their number.
+_SHOWN_SHARE = 0.07
+_POINTS_EACH = 4000
+
+
+def quadrant_distribution(results: Results, setup: str) -> Figure:
+    """Draw the share of windows in each quadrant, by scenario and strength (the paper's RQ2)."""
+    table = results.quadrants[results.quadrants.setup == setup]
+    scenarios = list(results.scenarios(setup).evaluated_on)
+    strengths = sorted(table.strength.unique(), key=lambda value: (pd.notna(value), value))
+    published = _published(table)
+    panels = len(strengths) + (published is not None)
+    with figure_style():
+        figure = Figure(figsize=(max(2.3 * panels + 1.4, 6.8), 0.3 * len(scenarios) + 1.5))
+        grid = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
+        for axes, strength in zip(grid, strengths, strict=False):
+            same = table.strength.isna() if pd.isna(strength) else table.strength == strength
+            _bars(axes, table[same], scenarios)
+            axes.set_title("" if pd.isna(strength) else f"strength {strength_name(strength)}")
+        if published is not None:
+            _published_ranges(grid[-1], published, len(scenarios))
+        grid[0].set_yticks(range(len(scenarios)), scenarios)
+        grid[0].set_ylim(len(scenarios) - 0.4, -0.6)
+        figure.supxlabel("share of assessed windows of disturbed recordings [%]", fontsize=9)
+        _legend(figure)
+    return figure
+
+
+def _bars(axes: Axes, table: pd.DataFrame, scenarios: Sequence[str]) -> None:
+    shares = table.pivot_table(index="evaluated_on", columns="quadrant", values="share")
+    shares = shares.reindex(index=list(scenarios), columns=list(QUADRANTS))
+    left = np.zeros(len(scenarios))
+    for quadrant in QUADRANTS:
+        width = shares[quadrant].fillna(0).to_numpy()
+        axes.barh(
+            np.arange(len(scenarios)),
+            100 * width,
+            left=100 * left,
+            height=0.78,
+            color=QUADRANT_COLOURS[quadrant],
+            hatch=QUADRANT_HATCHES[quadrant],
+            edgecolor="white",
+            linewidth=0.3,
+        )
+        for row, share in enumerate(width):
+            if share >= _SHOWN_SHARE:
+                _number(axes, 100 * (left[row] + share / 2), row, share)
+        left += width
+    for empty in np.flatnonzero(shares.isna().all(axis=1).to_numpy()):
+        axes.text(
+            50, int(empty), "not recorded", ha="center", va="center", color="#999999", fontsize=7
+        )
+    axes.set_xlim(0, 100)
+    axes.grid(visible=False, axis="y")
+
+
+def _number(axes: Axes, x: float, y: float, share: float) -> None:
+    box = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "boxstyle": "round,pad=0.12"}
+    axes.text(x, y, f"{100 * share:.0f}", ha="center", va="center", fontsize=6.5, bbox=box)
+
+
+def _published(table: pd.DataFrame) -> pd.DataFrame | None:
+    known = table[table.published.notna() & (table.published.astype(str) != "")]
+    if known.empty:
+        return None
+    return known.drop_duplicates("quadrant").set_index("quadrant")
+
+
+def _published_ranges(axes: Axes, published: pd.DataFrame, rows: int) -> None:
+    """Draw what the paper's text states as ranges: it prints no numbers in its figure."""
+    places = np.linspace(0, rows - 1, len(QUADRANTS))
+    height = min(1.0, 0.6 * rows / len(QUADRANTS))
+    for place, quadrant in zip(places, QUADRANTS, strict=True):
+        if quadrant not in published.index:
+            axes.text(
+                50, place, "not stated", ha="center", va="center", color="#777777", fontsize=7
+            )
+            continue
+        row: Any = published.loc[quadrant]
+        low, high = 100 * float(row.published_low), 100 * float(row.published_high)
+        axes.barh(
+            place,
+            max(high - low, 1.0),
+            left=low,
+            height=height,
+            color=QUADRANT_COLOURS[quadrant],
+            hatch=QUADRANT_HATCHES[quadrant],
+            edgecolor="black",
+            linewidth=0.6,
+        )
+        text = f"{low:.0f}-{high:.0f}" if high > low else f"{low:.0f}"
+        beside = (high + 3, "left") if high < 70 else (low - 3, "right")
+        axes.text(beside[0], place, text, ha=beside[1], va="center", fontsize=7)
+    axes.set_xlim(0, 100)
+    axes.grid(visible=False, axis="y")
+    axes.set_title("published (ranges)")
+
+
+def _legend(figure: Figure) -> None:
+    handles = [
+        Patch(
+            facecolor=QUADRANT_COLOURS[quadrant],
+            hatch=QUADRANT_HATCHES[quadrant],
+            edgecolor="white",
+            label=QUADRANT_NAMES[quadrant],
+        )
+        for quadrant in QUADRANTS
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=4)
+
+
+def quadrant_scatter(results: Results, setup: str) -> Figure:
+    """Draw reconstruction error against variance of every assessed window, thresholds as lines.
+
+    With several members, each with thresholds of its own, both axes are multiples of them.
+    """
+    windows = results.assessments(setup)
+    limits = results.limits(setup)
+    if len(limits) == 1:
+        columns = ("reconstruction_error", "uncertainty_variance")
+        thresholds = next(iter(limits.values()))["thresholds"]
+        lines = (thresholds["reconstruction"], thresholds["variance"])
+        names = ("reconstruction error [scaled units]", "predictive variance [scaled units$^2$]")
+    else:
+        columns, lines = ("error_ratio", "variance_ratio"), (1.0, 1.0)
+        names = (
+            "reconstruction error [multiples of its threshold]",
+            "predictive variance\n[multiples of its threshold]",
+        )
+    with figure_style():
+        figure = Figure(figsize=(7.6, 3.9))
+        grid = figure.subplots(1, 2, sharex=True, sharey=True)
+        for axes, disturbed in zip(grid, (False, True), strict=True):
+            chosen = windows[windows.is_disturbed == disturbed]
+            _points(axes, chosen, columns)
+            axes.axvline(lines[0], color="black", linewidth=1.0, linestyle="--")
+            axes.axhline(lines[1], color="black", linewidth=1.0, linestyle=":")
+            title = "disturbance active" if disturbed else "undisturbed"
+            axes.set_title(f"{title}: {len(chosen)} windows")
+        grid[0].set_xscale("log")
+        grid[0].set_yscale("log")
+        for axis in (grid[0].xaxis, grid[0].yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(NullFormatter())
+        grid[0].set_ylabel(names[1])
+        figure.supxlabel(names[0] + "; dashed and dotted: thresholds", fontsize=9)
+        _legend(figure)
+    return figure
+
+
+def _points(axes: Axes, windows: pd.DataFrame, columns: tuple[str, str]) -> None:
+    # Rarest on top. Evenly thinned where there are more points than a print can show.
+    markers = {"green": "o", "yellow": "s", "orange": "^", "red": "X"}
+    for quadrant in QUADRANTS:
+        chosen = windows[windows.category == quadrant]
+        chosen = chosen.iloc[:: max(1, len(chosen) // _POINTS_EACH)]
+        axes.scatter(
+            chosen[columns[0]],
+            chosen[columns[1]],
+            s=13,
+            marker=markers[quadrant],
+            color=QUADRANT_COLOURS[quadrant],
+            edgecolor="#333333",
+            linewidth=0.25,
+            alpha=0.75,
+        )

@@ -1,0 +1,48 @@
+"""What recordings look like: every channel of a disturbed and of an undisturbed one."""
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from odisar.report.load import Results
+from odisar.report.style import figure_style, shade_events
+
+_STATE, _COMMAND = "#0072B2", "#444444"
+
+
+def recordings_overview(results: Results, case: str) -> Figure:
+    """Draw all channels of the case's two examples, commands in grey, the event shaded."""
+    chosen = results.examples.chosen[case]
+    kinds = [kind for kind in ("disturbed", "clean") if kind in chosen]
+    channels = results.config.cases[case].channels
+    traces = results.examples.traces
+    traces = traces[traces.case == case]
+    with figure_style():
+        figure = Figure(figsize=(4.7 * len(kinds), 1.05 * len(channels) + 0.9))
+        grid = figure.subplots(len(channels), len(kinds), sharey="row", sharex="col", squeeze=False)
+        for column, kind in enumerate(kinds):
+            example = chosen[kind]
+            own = traces[traces.recording == example["recording"]]
+            for row, channel in enumerate(channels):
+                axes = grid[row][column]
+                _trace(axes, own[own.channel == channel.name], channel.role)
+                shade_events(axes, example["events"])
+                if column == 0:
+                    axes.set_ylabel(f"{channel.name.replace(' ', chr(10), 1)}\n[{channel.unit}]")
+            grid[0][column].set_title(f"{kind_name(kind)}\n{example['recording']}")
+            grid[-1][column].set_xlabel("time [min]")
+        figure.align_ylabels()
+    return figure
+
+
+def kind_name(kind: str) -> str:
+    """Return how a figure calls an example of this kind."""
+    return {"disturbed": "disturbed (event shaded)", "clean": "undisturbed"}[kind]
+
+
+def _trace(axes: Axes, samples: pd.DataFrame, role: str) -> None:
+    times = samples.time_s.to_numpy()
+    values = samples.value.to_numpy()
+    colour = _COMMAND if role == "command" else _STATE
+    drawn = axes.step if role == "command" else axes.plot
+    drawn(times / 60, values, color=colour, linewidth=0.8)

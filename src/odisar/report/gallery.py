@@ -1,0 +1,173 @@
+"""The list of figures: what each shows, where it stands in the report, and drawing them all."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from matplotlib.figure import Figure
+
+from odisar.report.figures.baselines import (
+    baselines_by_scenario,
+    baselines_by_strength,
+    components_apart,
+    has_components,
+    has_groups,
+    protocols,
+)
+from odisar.report.figures.events import (
+    attribution_shares,
+    event_attribution,
+    fault_heat_map,
+    forecast_examples,
+    has_faults,
+    has_flagged,
+)
+from odisar.report.figures.learning import training_curves, tuning_trials
+from odisar.report.figures.operating import operating_point
+from odisar.report.figures.quadrants import quadrant_distribution, quadrant_scatter
+from odisar.report.figures.recordings import recordings_overview
+from odisar.report.load import Results
+from odisar.report.style import save_figure
+
+Section = Literal["detection", "protocols", "quadrants", "events", "recordings", "learning"]
+
+
+@dataclass(frozen=True)
+class Plate:
+    """One figure, drawn for every set-up or for every case, if it applies."""
+
+    name: str
+    section: Section
+    caption: str
+    draw: Callable[[Results, str], Figure]
+    scope: Literal["setup", "case"] = "setup"
+    applies: Callable[[Results, str], bool] = lambda _results, _subject: True
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure on disk, with what the report says below it."""
+
+    section: Section
+    subject: str
+    caption: str
+    path: Path
+
+
+PLATES = (
+    Plate(
+        "baselines-by-strength",
+        "detection",
+        "Detection by strength of the disturbance under P2 (the score at t against 'disturbed at "
+        "t'). Hollow diamonds: published at full strength, with other data and another protocol.",
+        baselines_by_strength,
+    ),
+    Plate(
+        "baselines-by-scenario",
+        "detection",
+        "Detection by scenario under P2, at the greatest strength.",
+        baselines_by_scenario,
+        applies=has_groups,
+    ),
+    Plate(
+        "apart",
+        "detection",
+        "What is left out of the overall rows and judged apart, beside the overall at the same "
+        "strength (P2). Recordings disturbed from end to end hold no undisturbed time to rank "
+        "against, so they have no AUROC.",
+        components_apart,
+        applies=has_components,
+    ),
+    Plate(
+        "fault-heat-map",
+        "detection",
+        "Share of the faulty time with a score above its threshold, by fault and channel.",
+        fault_heat_map,
+        applies=has_faults,
+    ),
+    Plate(
+        "operating-point",
+        "detection",
+        "Alarms at the operating point: false alarms with exact Poisson intervals, events found, "
+        "delay after onset, and median time from alarm to consequence (below zero: too late).",
+        operating_point,
+    ),
+    Plate(
+        "protocols",
+        "protocols",
+        "The same scores under four protocols, at the greatest strength. The oracle knows whether "
+        "a disturbance is active now and nothing of the future; under P1 it cannot be perfect.",
+        protocols,
+    ),
+    Plate(
+        "quadrants",
+        "quadrants",
+        "Share of assessed windows in each confidence quadrant. Windows of disturbed recordings "
+        "before, in and after the event count, as published.",
+        quadrant_distribution,
+    ),
+    Plate(
+        "quadrant-scatter",
+        "quadrants",
+        "Every assessed window of the test recordings: right of the dashed line is OOD, above the "
+        "dotted line is uncertain. If the variance told disturbed from undisturbed windows, the "
+        "right panel's points would lie higher.",
+        quadrant_scatter,
+    ),
+    Plate(
+        "forecasts",
+        "events",
+        "Forecasts issued just before the event, soon after its onset and in its middle, with "
+        "what was recorded. The recorded future is drawn for comparison; the twin never sees it.",
+        forecast_examples,
+    ),
+    Plate(
+        "event",
+        "events",
+        "One event: the score as it was known at each time, the quadrant of each assessed window, "
+        "and the states blamed in windows flagged as OOD. Quadrant and blame are drawn over the "
+        "forecast's horizon.",
+        event_attribution,
+    ),
+    Plate(
+        "attribution",
+        "events",
+        "Which states the flagged windows blame, at the greatest strength.",
+        attribution_shares,
+        applies=has_flagged,
+    ),
+    Plate(
+        "recordings",
+        "recordings",
+        "Every channel of one disturbed and one undisturbed test recording; commands in grey.",
+        recordings_overview,
+        scope="case",
+    ),
+    Plate(
+        "training",
+        "learning",
+        "Training of each twin. The twin with the lowest validation forecast error is kept.",
+        training_curves,
+    ),
+)
+
+
+def draw_figures(results: Results, folder: Path) -> list[Drawn]:
+    """Draw every figure that applies into an emptied folder, as ``<name>-<subject>.png``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    drawn = []
+    for plate in PLATES:
+        subjects = results.setups if plate.scope == "setup" else results.cases
+        for subject in subjects:
+            if plate.applies(results, subject):
+                path = folder / f"{plate.name}-{subject}.png"
+                save_figure(plate.draw(results, subject), path)
+                drawn.append(Drawn(plate.section, subject, plate.caption, path))
+    path = folder / "tuning-trials.png"
+    save_figure(tuning_trials(results), path)
+    caption = "Every tuning trial's validation forecast error; no disturbed recording is looked at."
+    drawn.append(Drawn("learning", "", caption, path))
+    return drawn

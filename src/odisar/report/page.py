@@ -1,0 +1,123 @@
+"""The one-file report: a body that follows from the results, and a page with the run's facts."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from pygments.formatters import HtmlFormatter  # type: ignore[import-untyped]
+
+from odisar.report import overview, tables
+from odisar.report.gallery import Drawn
+from odisar.report.load import Results
+from odisar.report.notebooks import notebook_html, notebook_title
+from odisar.report.summary import summarise
+from odisar.report.tables import Table
+
+#: Names the content that a page was made from, so that a stale page can be told.
+CONTENT_META = "odisar-content"
+
+
+@dataclass(frozen=True)
+class SimulatorChecks:
+    """What the vessel simulator was held against; figures and tables may be missing.
+
+    ``advice`` says how to get the sea trial where it is not there.
+    """
+
+    tables: Sequence[Table]
+    figures: Sequence[Drawn]
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """What tracking knows about a run: identity, and what took how long."""
+
+    content: str
+    revision: str
+    data: str
+    experiment: str
+    published_at: str
+    stages: Sequence[tuple[str, str]]
+
+
+def render_body(
+    results: Results,
+    figures: Sequence[Drawn],
+    notebooks: Sequence[Path],
+    simulator: SimulatorChecks | None,
+) -> str:
+    """Return everything of the report that follows from results alone, as an HTML fragment."""
+    setups = results.setups
+    return (
+        _templates()
+        .get_template("body.html.j2")
+        .render(
+            title=results.config.report.title,
+            cases=[results.config.cases[name].title for name in results.cases],
+            summary=summarise(results),
+            headline=tables.headline(results),
+            operating=tables.operating(results),
+            scenarios=[t for setup in setups for t in tables.scenario_tables(results, setup)],
+            paper_protocol=[tables.paper_protocol(results, setup) for setup in setups],
+            quadrants=[tables.quadrants(results, setup) for setup in setups],
+            overview=[overview.splits(results), overview.nearness(results)],
+            quality=overview.quality(results),
+            learning=[
+                overview.training(results),
+                overview.thresholds(results),
+                *(tables.parameters(results, setup) for setup in setups),
+            ],
+            figures=figures,
+            simulator=simulator,
+            notebooks=[
+                {"title": notebook_title(path), "html": Markup(notebook_html(path))}  # noqa: S704
+                for path in notebooks
+            ],
+        )
+    )
+
+
+def render_page(title: str, body: str, facts: RunFacts, config: Mapping[str, Any]) -> str:
+    """Return the whole page; it needs no network and no other file."""
+    return (
+        _templates()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            body=Markup(body),  # noqa: S704 (made by render_body, which escapes)
+            facts=facts,
+            config=config,
+            content_meta=CONTENT_META,
+            code_style=Markup(HtmlFormatter().get_style_defs(".highlight")),  # noqa: S704
+        )
+    )
+
+
+def page_content(path: Path) -> str | None:
+    """Return the content that a page on disk was made from, or None."""
+    if not path.is_file():
+        return None
+    head = path.read_text(encoding="utf-8")[:2000]
+    _, found, rest = head.partition(f'<meta name="{CONTENT_META}" content="')
+    return rest.partition('"')[0] if found else None
+
+
+def _templates() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("odisar.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["data_uri"] = _data_uri
+    return environment
+
+
+def _data_uri(path: Path) -> str:
+    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode()}"

@@ -1,0 +1,66 @@
+"""One number out of the detection table, and how a sentence says it."""
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from odisar.report.load import OVERALL, Results
+from odisar.report.style import strength_name
+
+#: The detector that the project is about.
+MONITOR = "odisar"
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value of the detection table with its interval; NaN where there is none."""
+
+    value: float
+    low: float
+    high: float
+    published: float
+
+
+def pick(
+    results: Results,
+    setup: str,
+    detector: str,
+    metric: str,
+    strength: float | None = None,
+    *,
+    protocol: str = "P2",
+) -> Value | None:
+    """Return an overall value of the detection table, or None where there is none.
+
+    ``strength`` None means the greatest there is. Rates of false alarms have no strength.
+    """
+    table = results.detection
+    rows = table[
+        (table.setup == setup)
+        & (table.detector == detector)
+        & (table.metric == metric)
+        & (table.evaluated_on == OVERALL)
+        & (table.protocol == protocol)
+    ]
+    if metric != "false_alarms_per_hour":
+        at = results.strengths(setup)[-1] if strength is None else strength
+        rows = rows[rows.strength.isna() if pd.isna(at) else rows.strength == at]
+    rows = rows[rows.value.notna()]
+    if rows.empty:
+        return None
+    return Value(
+        *(float(rows[name].iloc[0]) for name in ("value", "ci_low", "ci_high", "published"))
+    )
+
+
+def percent(found: Value) -> str:
+    """Return a share in percent with its interval."""
+    text = f"{100 * found.value:.1f} %"
+    if pd.isna(found.low) or pd.isna(found.high):
+        return text
+    return f"{text} ({100 * found.low:.1f} to {100 * found.high:.1f})"
+
+
+def at_strength(strength: float) -> str:
+    """Return "at strength 0.5", or nothing for recordings without a strength."""
+    return "" if pd.isna(strength) else f"at strength {strength_name(strength)}"

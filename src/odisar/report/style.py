@@ -1,0 +1,139 @@
+"""How every figure looks, and how it becomes the same bytes each time."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib_inline.backend_inline import set_matplotlib_formats
+
+#: Most abnormal last: the order in which shares are stacked.
+QUADRANTS = ("green", "yellow", "orange", "red")
+QUADRANT_NAMES = {
+    "green": "IND, confident",
+    "yellow": "IND, uncertain",
+    "orange": "OOD, uncertain",
+    "red": "OOD, confident",
+}
+#: The paper's colours, in shades of different lightness; the hatches serve print and eyes that
+#: do not tell red from green.
+QUADRANT_COLOURS = {
+    "green": "#2f9e5b",
+    "yellow": "#f9e07f",
+    "orange": "#f08a24",
+    "red": "#a3142a",
+}
+QUADRANT_HATCHES = {"green": "", "yellow": "....", "orange": "////", "red": "xxxx"}
+
+ORACLE = "oracle"
+DETECTOR_NAMES = {
+    "odisar": "ODiSAR",
+    "rmse": "forecast RMSE",
+    "rmse-short-lead": "forecast RMSE, short lead",
+    ORACLE: "oracle (knows 'disturbed now')",
+}
+# Okabe and Ito (2008): told apart with any kind of colour vision.
+_PALETTE = ("#0072B2", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
+_ORACLE_COLOUR = "#555555"
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+_ORACLE_MARKER = "X"
+
+METRIC_NAMES = {
+    "auroc": "AUROC",
+    "tnr_at_tpr95": "TNR@TPR95",
+    "f1_ind": "F1 IND",
+    "f1_ood": "F1 OOD",
+    "events_detected": "events detected",
+    "false_alarms_per_hour": "false alarms per hour",
+    "delay_p50_s": "delay p50 [s]",
+    "delay_p90_s": "delay p90 [s]",
+    "lead_time_p50_s": "lead time p50 [s]",
+}
+#: Metrics that are shares, shown in percent.
+SHARES = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood", "events_detected")
+
+#: Shade of the time in which a disturbance is active.
+EVENT_COLOUR = "#b8c4d6"
+
+_DPI = 150
+# Without these, the file would name the version of the program that drew it.
+_NO_METADATA = {"Software": None, "Creation Time": None}
+_SETTINGS: dict[Any, Any] = {
+    "figure.dpi": 100,
+    "figure.constrained_layout.use": True,
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "legend.fontsize": 8,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "hatch.linewidth": 0.5,
+    "legend.frameon": False,
+}
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Apply the style to figures made inside."""
+    with sns.axes_style("whitegrid", {"grid.color": "#e4e4e4"}), mpl.rc_context(_SETTINGS):
+        yield
+
+
+def use_figure_style() -> None:
+    """Apply the style to all figures from now on, in a notebook."""
+    sns.set_style("whitegrid", {"grid.color": "#e4e4e4"})
+    mpl.rcParams.update(_SETTINGS)
+    # The layout is constrained already; cutting to the ink would draw every figure twice.
+    set_matplotlib_formats("png", bbox_inches=None)  # type: ignore[no-untyped-call]
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a PNG; the same figure gives the same bytes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=_DPI, metadata=_NO_METADATA)
+
+
+def detector_name(detector: str) -> str:
+    """Return a detector's name for a legend."""
+    return DETECTOR_NAMES.get(detector, detector)
+
+
+def detector_colour(detector: str, detectors: Sequence[str]) -> str:
+    """Return a detector's colour: its place among the set-up's detectors, or the oracle's grey."""
+    if detector == ORACLE:
+        return _ORACLE_COLOUR
+    known = [name for name in detectors if name != ORACLE]
+    return _PALETTE[known.index(detector) % len(_PALETTE)]
+
+
+def detector_marker(detector: str, detectors: Sequence[str]) -> str:
+    """Return a detector's marker, so that colour is not the only difference."""
+    if detector == ORACLE:
+        return _ORACLE_MARKER
+    known = [name for name in detectors if name != ORACLE]
+    return _MARKERS[known.index(detector) % len(_MARKERS)]
+
+
+def strength_name(strength: float) -> str:
+    """Return a strength for an axis; recordings without one are simply all of them."""
+    return "all" if pd.isna(strength) else f"{strength:g}"
+
+
+def shade_events(axes: Axes, events: Sequence[tuple[float, float]], label: str = "event") -> None:
+    """Shade the disturbed stretches of a time axis, in minutes; only the first gets a label."""
+    for number, (start_s, end_s) in enumerate(events):
+        axes.axvspan(
+            start_s / 60,
+            end_s / 60,
+            color=EVENT_COLOUR,
+            alpha=0.55,
+            linewidth=0,
+            zorder=0,
+            label=label if number == 0 else None,
+        )

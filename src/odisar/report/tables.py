@@ -1,0 +1,238 @@
+"""Result tables as the report prints them: text cells, intervals in brackets, published beside."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+
+from odisar.report.headline import headline_table
+from odisar.report.load import OVERALL, Results, rows_of
+from odisar.report.style import (
+    METRIC_NAMES,
+    ORACLE,
+    QUADRANT_NAMES,
+    SHARES,
+    detector_name,
+    strength_name,
+)
+
+DETECTION_METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
+EVENT_METRICS = ("events_detected", "delay_p50_s", "delay_p90_s", "lead_time_p50_s")
+
+#: The paper's table of model and training parameters, by name in ``params.yaml``.
+PUBLISHED_PARAMETERS: dict[str, float] = {
+    "twin.patch_steps": 1,
+    "twin.model_dim": 64,
+    "twin.heads": 4,
+    "twin.layers": 3,
+    "twin.feedforward_dim": 128,
+    "twin.dropout": 0.1,
+    "training.learning_rate": 1e-4,
+    "training.batch_size": 16,
+    "training.epochs": 200,
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table to print: every row has a text for every column."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    folded: bool = field(default=False)
+
+
+def frame_table(title: str, frame: pd.DataFrame, note: str = "", *, folded: bool = False) -> Table:
+    """Return a table of a frame whose cells are text already."""
+    rows = [[str(value) for value in row] for row in frame.itertuples(index=False, name=None)]
+    return Table(title, [str(name) for name in frame.columns], rows, note, folded)
+
+
+def number(value: object, digits: int = 3) -> str:
+    """Return a number with so many significant digits; a dash for a missing one."""
+    if value is None or pd.isna(value):  # type: ignore[call-overload]
+        return "-"
+    return f"{float(str(value)):.{digits}g}"
+
+
+def metric_cell(value: float, low: float, high: float, metric: str) -> str:
+    """Return ``value [low, high]``; shares in percent."""
+    if pd.isna(value):
+        return "-"
+    scale = 100 if metric in SHARES else 1
+    text = f"{scale * value:.1f}"
+    if pd.isna(low) or pd.isna(high):
+        return text
+    return f"{text} [{scale * low:.1f}, {scale * high:.1f}]"
+
+
+def headline(results: Results) -> Table:
+    """Return the headline table, published values beside those at full strength."""
+    rows = results.detection
+    rows = rows[(rows.protocol == "P2") & (rows.evaluated_on == OVERALL)]
+    frame = headline_table(results.detection)
+    keys = frame[["set-up", "strength", "detector"]]
+    published = [
+        _published_line(rows, setup, strength, detector)
+        for setup, strength, detector in rows_of(keys)
+    ]
+    frame["detector"] = frame["detector"].map(detector_name)
+    frame["published (AUROC / TNR@TPR95 / F1 IND / F1 OOD)"] = published
+    told = [name for name in frame.columns if (frame[name] != "").any()]
+    return frame_table(
+        "Overall, protocol P2",
+        frame[told],
+        "95 % intervals in brackets: bootstrap over recordings, exact Poisson for false alarms. "
+        "Published values come from other data and another protocol.",
+    )
+
+
+def _published_line(rows: pd.DataFrame, setup: str, strength: str, detector: str) -> str:
+    own = rows[(rows.setup == setup) & (rows.detector == detector)]
+    own = own[own.strength.map(lambda s: "" if pd.isna(s) else f"{s:g}") == strength]
+    values = own.set_index("metric").published.reindex(list(DETECTION_METRICS))
+    if values.isna().all():
+        return ""
+    return " / ".join("-" if pd.isna(value) else f"{100 * value:.1f}" for value in values)
+
+
+def scenario_tables(results: Results, setup: str) -> list[Table]:
+    """Return a table for each strength: scenario by detector under P2, event metrics beside."""
+    rows = results.detection
+    rows = rows[(rows.setup == setup) & (rows.protocol == "P2") & (rows.detector != ORACLE)]
+    metrics = (*DETECTION_METRICS, *EVENT_METRICS)
+    rows = rows[rows.metric.isin(metrics)]
+    order = list(results.scenarios(setup).evaluated_on)
+    tables = []
+    for strength in sorted(rows.strength.unique(), key=lambda s: (pd.isna(s), -s)):
+        same = rows[rows.strength.isna() if pd.isna(strength) else rows.strength == strength]
+        title = f"{setup}: by scenario"
+        title += "" if pd.isna(strength) else f", strength {strength_name(strength)}"
+        tables.append(_wide(title, same, order, metrics, folded=True))
+    return tables
+
+
+def _wide(
+    title: str,
+    rows: pd.DataFrame,
+    order: Sequence[str],
+    metrics: Sequence[str],
+    *,
+    folded: bool = False,
+    note: str = "",
+) -> Table:
+    lines = []
+    for name in [name for name in order if name in set(rows.evaluated_on)]:
+        own = rows[rows.evaluated_on == name]
+        for detector in own.detector.unique():
+            values = own[own.detector == detector].set_index("metric")
+            lines.append(
+                [name, detector_name(detector), *(_lookup(values, metric) for metric in metrics)]
+            )
+    heads = [METRIC_NAMES[m] + (" %" if m in SHARES else "") for m in metrics]
+    return Table(title, ["evaluated on", "detector", *heads], lines, note, folded)
+
+
+def _lookup(values: pd.DataFrame, metric: str) -> str:
+    if metric not in values.index:
+        return "-"
+    row: Any = values.loc[metric]
+    return metric_cell(row.value, row.ci_low, row.ci_high, metric)
+
+
+def paper_protocol(results: Results, setup: str) -> Table:
+    """Return P1 at the greatest strength, each scenario's oracle and published values beside."""
+    rows = results.detection
+    rows = rows[(rows.setup == setup) & (rows.protocol == "P1")]
+    strongest = results.strengths(setup)[-1]
+    rows = rows[rows.strength.isna() if pd.isna(strongest) else rows.strength == strongest]
+    lines = []
+    for name in results.scenarios(setup).evaluated_on:
+        own = rows[rows.evaluated_on == name]
+        for detector in own.detector.unique():
+            values = own[own.detector == detector].set_index("metric")
+            cells = [_lookup(values, metric) for metric in DETECTION_METRICS]
+            published = values.published.reindex(list(DETECTION_METRICS))
+            known = [("-" if pd.isna(v) else f"{100 * v:.1f}") for v in published]
+            lines.append(
+                [
+                    name,
+                    detector_name(detector),
+                    *cells,
+                    " / ".join(known) if any_known(known) else "",
+                ]
+            )
+    heads = [f"{METRIC_NAMES[metric]} %" for metric in DETECTION_METRICS]
+    title = f"{setup}: protocol P1 beside its oracle"
+    title += "" if pd.isna(strongest) else f", strength {strength_name(strongest)}"
+    return Table(title, ["evaluated on", "detector", *heads, "published"], lines, folded=True)
+
+
+def any_known(cells: Sequence[str]) -> bool:
+    """Whether any cell holds more than a dash."""
+    return any(cell != "-" for cell in cells)
+
+
+def operating(results: Results) -> Table:
+    """Return the hours and events behind the operating point."""
+    frame = pd.DataFrame(
+        [
+            {
+                "set-up": row.setup,
+                "detector": detector_name(row.detector),
+                "undisturbed hours": f"{row.hours:.1f}",
+                "false alarms": str(row.false_alarms),
+                "per hour": metric_cell(row.false_alarms_per_hour, row.ci_low, row.ci_high, ""),
+                "events": str(row.events),
+                "detected": str(row.events_detected),
+            }
+            for row in rows_of(results.operating)
+        ]
+    )
+    promised = results.config.evaluation.operating_point.promised_per_hour
+    note = f"Promised: at most {promised:g} false alarm(s) per hour. Events of all strengths."
+    return frame_table("Operating point", frame, note)
+
+
+def quadrants(results: Results, setup: str) -> Table:
+    """Return the quadrant shares, and those among disturbed and undisturbed windows."""
+    own = results.quadrants[results.quadrants.setup == setup]
+    lines = []
+    for (name, strength), part in own.groupby(
+        ["evaluated_on", "strength"], sort=False, dropna=False
+    ):
+        by_quadrant = part.set_index("quadrant")
+        cells = []
+        for quadrant in QUADRANT_NAMES:
+            row: Any = by_quadrant.loc[quadrant]
+            within = f"{_percent(row.share_of_disturbed)} / {_percent(row.share_of_undisturbed)}"
+            share = metric_cell(row.share, row.ci_low, row.ci_high, "auroc")
+            cells.append(f"{share} ({within})")
+        lines.append(
+            [str(name), strength_name(float(str(strength))), str(part.windows.iloc[0]), *cells]
+        )
+    heads = ["evaluated on", "strength", "windows", *QUADRANT_NAMES.values()]
+    note = "Percent with interval; in parentheses the share among disturbed / undisturbed windows."
+    return Table(f"{setup}: quadrants", heads, lines, note, folded=True)
+
+
+def _percent(value: float) -> str:
+    return "-" if pd.isna(value) else f"{100 * value:.0f}"
+
+
+def parameters(results: Results, setup: str) -> Table:
+    """Return configured and tuned parameters of a set-up, beside the paper's where it is one."""
+    config = results.config
+    tuned = results.tuning(setup)["tuned"]
+    is_published = config.setups[setup].published_as is not None
+    lines = []
+    for name, published in PUBLISHED_PARAMETERS.items():
+        section, _, key = name.partition(".")
+        configured = getattr(getattr(config, section), key)
+        line = [name, number(configured), number(tuned.get(name)) if name in tuned else "not tuned"]
+        lines.append([*line, number(published)] if is_published else line)
+    heads = ["parameter", "configured", "tuned", *(["published"] if is_published else [])]
+    return Table(f"{setup}: parameters", heads, lines)

@@ -1,0 +1,134 @@
+"""Put the one-file report together and complete the parent run in MLflow.
+
+The report says when and how long, so it differs from run to run and is no output of the pipeline;
+what it is made from is.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from odisar.artifacts import Workspace, read_json, write_json
+from odisar.config.loader import ConfigView, load_config
+from odisar.errors import OdisarError
+from odisar.report.load import report_folder
+from odisar.report.page import RunFacts, page_content, render_page
+from odisar.stages.runner import STAGES
+from odisar.tracking import TrackedRun, Tracker, content_key, data_hash, flatten, git_revision
+
+PARAMS = (
+    "seed",
+    "pipeline",
+    "setups",
+    "cases",
+    "twin",
+    "training",
+    "tuning",
+    "capability",
+    "evaluation",
+    "tracking",
+    "report",
+    "simulators",
+    "sources",
+)
+
+#: Set on the parent run by the last step, with the key of what was published.
+_PUBLISHED_TAG = "odisar.published"
+
+
+def run(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
+    """Run the stage; a second time it changes nothing but the report's time."""
+    sections = configured(config)
+    write_report(config, workspace, tracker)
+    parent = tracker.parent()
+    parent.params(sections)
+    parent.metrics(read_json(workspace.metrics))
+    for setup in config.pipeline.setups:
+        parent.artifact(workspace.thresholds(setup), "thresholds")
+        parent.artifact(workspace.assessments(setup), "assessments")
+    parent.artifact(workspace.results, "results")
+    parent.artifact(workspace.figures, "figures")
+    parent.artifact(workspace.report)
+    _mark(parent, workspace)
+    tracker.finish()
+
+
+def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
+    """Write ``reports/report.html`` from the report stage's body and what tracking knows."""
+    path = report_folder(workspace.root) / "body.html"
+    if not path.is_file():
+        raise OdisarError(f"{path} is missing; run the report stage (dvc repro)")
+    facts = run_facts(config, workspace, tracker)
+    body = path.read_text(encoding="utf-8")
+    page = render_page(config.report.title, body, facts, flatten(configured(config)))
+    workspace.report.parent.mkdir(parents=True, exist_ok=True)
+    workspace.report.write_text(page, encoding="utf-8")
+
+
+def run_facts(config: ConfigView, workspace: Workspace, tracker: Tracker) -> RunFacts:
+    """Return what tracking knows about the content of the workspace."""
+    seconds = tracker.stage_seconds()
+    return RunFacts(
+        content=content_key(workspace.root),
+        revision=git_revision(workspace.root),
+        data=data_hash(workspace.root),
+        experiment=config.tracking.experiment,
+        published_at=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        stages=[(name, _duration(seconds.get(name))) for name in STAGES if name != "publish"],
+    )
+
+
+def rebuild_report(root: Path) -> None:
+    """Bring the report up to date, notebooks included, and print where it is."""
+    command = [sys.executable, "-m", "dvc", "repro", "report", "publish"]
+    # The pipeline says `python`: it must be this one, whether or not .venv is activated.
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    done = subprocess.run(command, cwd=root, env=os.environ | {"PATH": path}, check=False)
+    if done.returncode:
+        raise OdisarError("the report could not be made; what went wrong stands above")
+    ensure_published(root)
+    print(f"report: {Workspace(root).report}")  # noqa: T201
+
+
+def ensure_published(root: Path) -> None:
+    """Publish again where DVC had no reason to, but page or parent run are not of this content.
+
+    DVC restores a stage that it has run before from its cache; the page, which is none of its
+    outputs, is then still that of the run in between.
+    """
+    config = load_config(root)
+    workspace = Workspace(root)
+    tracker = Tracker(root, config.tracking.experiment)
+    found = tracker.find_parent()
+    is_published = found is not None and _PUBLISHED_TAG in found.data.tags
+    if not is_published or page_content(workspace.report) != content_key(root):
+        run(ConfigView(config, PARAMS), workspace, tracker)
+
+
+def configured(config: ConfigView) -> dict[str, Any]:
+    """Return every section as plain mappings."""
+    return {name: _plain(getattr(config, name)) for name in PARAMS}
+
+
+def _plain(section: object) -> object:
+    if isinstance(section, Mapping):
+        return {key: _plain(value) for key, value in section.items()}
+    dump = getattr(section, "model_dump", None)
+    return dump() if dump else section
+
+
+def _duration(seconds: float | None) -> str:
+    if seconds is None:
+        return "from cache"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{seconds:.1f} s"
+
+
+def _mark(parent: TrackedRun, workspace: Workspace) -> None:
+    key = content_key(workspace.root)
+    write_json(workspace.root / "build/published.json", {"content": key})
+    parent.tags({_PUBLISHED_TAG: key})

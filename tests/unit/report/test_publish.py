@@ -1,0 +1,87 @@
+"""The publish stage, with a tracker that only remembers."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from odisar.artifacts import read_json, write_json
+from odisar.config.loader import ConfigView, load_config
+from odisar.errors import OdisarError
+from odisar.report.load import report_folder
+from odisar.report.page import page_content
+from odisar.stages import publish
+from odisar.tracking import content_key
+
+from .invented import ROOT
+from .invented_tables import SETUPS
+
+
+class RememberingTracker:
+    def __init__(self):
+        self.logged = {"params": {}, "metrics": {}, "artifacts": [], "tags": {}, "finished": 0}
+
+    def parent(self):
+        logged = self.logged
+        return SimpleNamespace(
+            params=logged["params"].update,
+            metrics=logged["metrics"].update,
+            tags=logged["tags"].update,
+            artifact=lambda path, _folder=None: logged["artifacts"].append(path.name),
+        )
+
+    def stage_seconds(self):
+        return {"train": 125.0, "report": 20.04}
+
+    def finish(self):
+        self.logged["finished"] += 1
+
+
+@pytest.fixture
+def config():
+    return ConfigView(load_config(ROOT), publish.PARAMS)
+
+
+@pytest.fixture
+def tracker():
+    return RememberingTracker()
+
+
+@pytest.fixture
+def ready(workspace):
+    workspace.figures.mkdir(parents=True)
+    write_json(workspace.metrics, {"vessel-all.odisar.s1.auroc": 0.95})
+    (report_folder(workspace.root) / "body.html").write_text("<p>the body</p>")
+    return workspace
+
+
+def test_the_parent_run_gets_everything_and_is_finished(config, ready, tracker):
+    publish.run(config, ready, tracker)
+    logged = tracker.logged
+    assert logged["params"]["training"]["epochs"] == config.training.epochs
+    assert logged["metrics"] == {"vessel-all.odisar.s1.auroc": 0.95}
+    wanted = {f"{setup}.assessments.json" for setup in SETUPS} | {"report.html", "results"}
+    assert wanted <= set(logged["artifacts"])
+    assert logged["finished"] == 1
+
+
+def test_the_page_is_made_of_the_body_and_of_what_tracking_knows(config, ready, tracker):
+    publish.run(config, ready, tracker)
+    page = ready.report.read_text()
+    assert "<p>the body</p>" in page
+    assert "2 min 5 s" in page
+    assert "20.0 s" in page
+    assert "from cache" in page
+    assert page_content(ready.report) == content_key(ready.root)
+    assert read_json(ready.root / "build/published.json") == {"content": content_key(ready.root)}
+
+
+def test_a_second_time_logs_the_same(config, ready, tracker):
+    publish.run(config, ready, tracker)
+    before = dict(tracker.logged["params"])
+    publish.run(config, ready, tracker)
+    assert tracker.logged["params"] == before
+
+
+def test_without_a_body_it_says_what_to_run(config, workspace, tracker):
+    with pytest.raises(OdisarError, match="run the report stage"):
+        publish.run(config, workspace, tracker)
