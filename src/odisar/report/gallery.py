@@ -30,7 +30,16 @@ from odisar.report.figures.recordings import recordings_overview
 from odisar.report.load import Results
 from odisar.report.style import save_figure
 
-Section = Literal["detection", "protocols", "quadrants", "events", "recordings", "learning"]
+Section = Literal[
+    "detection",
+    "protocols",
+    "quadrants",
+    "events",
+    "recordings",
+    "learning",
+    "simulator",
+    "sea-trial",
+]
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,8 @@ CONTENT_META = "odisar-content"
 
 
 @dataclass(frozen=True)
-class SimulatorChecks:
-    """What the vessel simulator was held against; figures and tables may be missing.
-
-    ``advice`` says how to get the sea trial where it is not there.
-    """
+class SeaTrial:
+    """The vessel simulator held against a sea trial; ``advice`` says how to get a missing one."""
 
     tables: Sequence[Table]
     figures: Sequence[Drawn]
@@ -49,7 +46,7 @@ def render_body(
     results: Results,
     figures: Sequence[Drawn],
     notebooks: Sequence[Path],
-    simulator: SimulatorChecks | None,
+    plausibility: Table | None,
 ) -> str:
     """Return everything of the report that follows from results alone, as an HTML fragment."""
     setups = results.setups
@@ -73,7 +70,7 @@ def render_body(
                 *(tables.parameters(results, setup) for setup in setups),
             ],
             figures=figures,
-            simulator=simulator,
+            plausibility=plausibility,
             notebooks=[
                 {"title": notebook_title(path), "html": Markup(notebook_html(path))}  # noqa: S704
                 for path in notebooks
@@ -82,7 +79,13 @@ def render_body(
     )
 
 
-def render_page(title: str, body: str, facts: RunFacts, config: Mapping[str, Any]) -> str:
+def render_page(
+    title: str,
+    body: str,
+    facts: RunFacts,
+    config: Mapping[str, Any],
+    trial: SeaTrial | None = None,
+) -> str:
     """Return the whole page; it needs no network and no other file."""
     return (
         _templates()
@@ -91,6 +94,7 @@ def render_page(title: str, body: str, facts: RunFacts, config: Mapping[str, Any
             title=title,
             body=Markup(body),  # noqa: S704 (made by render_body, which escapes)
             facts=facts,
+            trial=trial,
             config=config,
             content_meta=CONTENT_META,
             code_style=Markup(HtmlFormatter().get_style_defs(".highlight")),  # noqa: S704

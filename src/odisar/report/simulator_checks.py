@@ -1,16 +1,18 @@
-"""The vessel simulator's part of the report: plausibility, and the sea trial if it is at hand."""
+"""The sea trial in the report, where its file is at hand.
+
+The file is no part of the project, so what it shows must not reach an output of the pipeline: with
+it and without it, the pipeline makes the same bytes.
+"""
 
 import os
 from pathlib import Path
 
-from odisar.config.simulators import VesselSimulatorConfig
 from odisar.config.sources import PinnedFile
 from odisar.report import overview
 from odisar.report.figures.simulator import sea_trial
 from odisar.report.gallery import Drawn
-from odisar.report.page import SimulatorChecks
+from odisar.report.page import SeaTrial
 from odisar.report.style import save_figure
-from odisar.simulators.vessel.plausibility import plausibility_table
 from odisar.simulators.vessel.validation import sea_trial_table, validation_traces
 
 _CAPTION = (
@@ -19,27 +21,29 @@ _CAPTION = (
 )
 
 
-def check_simulator(
-    config: VesselSimulatorConfig, seed: int, trial: Path | None, file: PinnedFile, folder: Path
-) -> SimulatorChecks:
-    """Return tables and figures; ``trial`` is the sea trial's CSV file, None if not there."""
-    tables = [overview.plausibility(plausibility_table(config, seed))]
+def show_sea_trial(file: PinnedFile, root: Path, figure: Path) -> SeaTrial:
+    """Return table and figure (written to ``figure``), or how to get the file."""
+    trial = find_trial(file, root)
     if trial is None:
         advice = (
-            "The equations can also be held against a public sea trial of R/V Gunnerus, which is "
-            f"not part of this project. Set {file.environment_variable} to a copy of "
+            "The simulator's equations can be held against a public sea trial of R/V Gunnerus, "
+            f"which is not part of this project. Set {file.environment_variable} to a copy of "
             f"{file.file_name} ({file.credit}) or run `make real`, which downloads it; then "
-            "repeat the report stage."
+            "`make report`."
         )
-        return SimulatorChecks(tables, [], advice)
-    tables.append(overview.sea_trial(sea_trial_table(trial)))
-    path = folder / "sea-trial.png"
-    save_figure(sea_trial(validation_traces(trial)), path)
-    return SimulatorChecks(tables, [Drawn("recordings", "", _CAPTION, path)])
+        return SeaTrial([], [], advice)
+    save_figure(sea_trial(validation_traces(trial)), figure)
+    drawn = Drawn("sea-trial", "", _CAPTION, figure)
+    return SeaTrial([overview.sea_trial(sea_trial_table(trial))], [drawn])
 
 
 def find_trial(file: PinnedFile, root: Path) -> Path | None:
-    """Return the sea trial's file if it is there already; nothing is downloaded."""
+    """Return the sea trial's file if it is there already; nothing is downloaded.
+
+    Looked for where the environment variable says, in this workspace, and in that of ``make real``.
+    """
     named = os.environ.get(file.environment_variable, "").strip()
-    path = Path(named).expanduser() if named else root / file.folder / file.file_name
-    return path if path.is_file() else None
+    below = Path(file.folder) / file.file_name
+    places = [Path(named).expanduser()] if named else []
+    places += [root / below, root / "workspaces/real" / below]
+    return next((path for path in places if path.is_file()), None)

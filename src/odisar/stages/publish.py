@@ -17,6 +17,8 @@ from odisar.config.loader import ConfigView, load_config
 from odisar.errors import OdisarError
 from odisar.report.load import report_folder
 from odisar.report.page import RunFacts, page_content, render_page
+from odisar.report.simulator_checks import show_sea_trial
+from odisar.stages.report import SIMULATED_CASE
 from odisar.stages.runner import STAGES
 from odisar.tracking import TrackedRun, Tracker, content_key, data_hash, flatten, git_revision
 
@@ -64,7 +66,11 @@ def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> 
         raise OdisarError(f"{path} is missing; run the report stage (dvc repro)")
     facts = run_facts(config, workspace, tracker)
     body = path.read_text(encoding="utf-8")
-    page = render_page(config.report.title, body, facts, flatten(configured(config)))
+    trial = None
+    if SIMULATED_CASE in config.active_cases:
+        picture = workspace.root / "build/sea-trial.png"
+        trial = show_sea_trial(config.sources.gunnerus.file, workspace.root, picture)
+    page = render_page(config.report.title, body, facts, flatten(configured(config)), trial)
     workspace.report.parent.mkdir(parents=True, exist_ok=True)
     workspace.report.write_text(page, encoding="utf-8")
 

@@ -17,11 +17,14 @@ from odisar.report.examples import (
     traces_table,
     write_examples,
 )
-from odisar.report.gallery import draw_figures
+from odisar.report.figures.simulator import standard_trials
+from odisar.report.gallery import Drawn, draw_figures
 from odisar.report.load import Results, report_folder
 from odisar.report.notebooks import execute_notebooks
-from odisar.report.page import SimulatorChecks, render_body
-from odisar.report.simulator_checks import check_simulator, find_trial
+from odisar.report.overview import plausibility
+from odisar.report.page import render_body
+from odisar.report.style import save_figure
+from odisar.simulators.vessel.plausibility import plausibility_table, trial_traces
 from odisar.stages.members import load_member, pipeline_members
 from odisar.tracking import TrackedRun
 from odisar.twin.bundle import read_twin
@@ -38,11 +41,10 @@ PARAMS = (
     "evaluation",
     "report",
     "simulators",
-    "sources",
 )
 
 #: The case whose recordings come from the vessel simulator.
-_SIMULATED_CASE = "vessel"
+SIMULATED_CASE = "vessel"
 
 
 def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
@@ -54,9 +56,12 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     with ThreadPoolExecutor(1) as pool:
         executing = pool.submit(execute_notebooks, workspace.root, folder / "notebooks")
         figures = draw_figures(results, workspace.figures)
-        simulator = _simulator(config, workspace)
+        plausible = None
+        if SIMULATED_CASE in config.active_cases:
+            figures.append(_draw_trials(config, workspace))
+            plausible = plausibility(plausibility_table(config.simulators.vessel, config.seed))
         notebooks = executing.result()
-    body = render_body(results, figures, notebooks, simulator)
+    body = render_body(results, figures, notebooks, plausible)
     (folder / "body.html").write_text(body, encoding="utf-8")
     tracked.artifact(workspace.figures, "figures")
     tracked.metrics({"figures": len(figures), "notebooks": len(notebooks)})
@@ -103,9 +108,8 @@ def _member_of(tested: Sequence[Tested], setup: str, recording: str) -> str:
     )
 
 
-def _simulator(config: ConfigView, workspace: Workspace) -> SimulatorChecks | None:
-    if _SIMULATED_CASE not in config.active_cases:
-        return None
-    file = config.sources.gunnerus.file
-    trial = find_trial(file, workspace.root)
-    return check_simulator(config.simulators.vessel, config.seed, trial, file, workspace.figures)
+def _draw_trials(config: ConfigView, workspace: Workspace) -> Drawn:
+    path = workspace.figures / "standard-trials.png"
+    save_figure(standard_trials(trial_traces(config.simulators.vessel)), path)
+    caption = "The simulated ferry in calm water: turning circles and zigzags at four angles."
+    return Drawn("simulator", "", caption, path)

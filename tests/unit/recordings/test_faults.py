@@ -34,7 +34,7 @@ def test_each_fault_gives_a_copy_that_says_what_it_is(copies):
     }
     sizes = {kind: copy.info.column("fault_size") for kind, copy in faulty.items()}
     assert sizes == {"noise": "2 sd", "bias": "2 sd", "drift": "2 sd", "stuck": "", "delay": "3 s"}
-    for kind, copy in faulty.items():
+    for copy in faulty.values():
         assert copy.info.components == "all"
         assert copy.info.base_seed == "turn"
         assert copy.info.maneuver == "turning"

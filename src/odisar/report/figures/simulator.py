@@ -1,12 +1,16 @@
-"""The vessel simulator held against a sea trial."""
+"""The vessel simulator held against a sea trial, and the ferry in standard trials."""
 
 import pandas as pd
+import seaborn as sns
 from matplotlib.figure import Figure
 
 from odisar.report.style import figure_style
 
 #: Part of the trial that is drawn: zigzags and a turning circle fit in it [s].
 _SHOWN_S = (1000.0, 2600.0)
+
+#: Part of a zigzag that is drawn: a few overshoots to each side [s].
+_ZIGZAG_S = 400.0
 
 
 def sea_trial(traces: pd.DataFrame) -> Figure:
@@ -26,4 +30,26 @@ def sea_trial(traces: pd.DataFrame) -> Figure:
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2)
         figure.align_ylabels()
+    return figure
+
+
+def standard_trials(traces: pd.DataFrame) -> Figure:
+    """Draw the ferry's turning circles and zigzags in calm water (``trial_traces``)."""
+    turns = traces[traces.trial == "turning"]
+    zigzags = traces[(traces.trial == "zigzag") & (traces.time_s <= _ZIGZAG_S)]
+    angles = sorted(traces.angle_deg.unique())
+    colours = dict(zip(angles, sns.color_palette("viridis", len(angles)), strict=True))
+    with figure_style():
+        figure = Figure(figsize=(8.4, 3.6))
+        tracks, headings = figure.subplots(1, 2, width_ratios=[1, 1.4])
+        for angle in angles:
+            label, colour = f"{angle:g} deg", colours[angle]
+            track = turns[turns.angle_deg == angle]
+            tracks.plot(track.aside, track.ahead, color=colour, linewidth=1.1)
+            zigzag = zigzags[zigzags.angle_deg == angle]
+            headings.plot(zigzag.time_s, zigzag.turned_deg, color=colour, lw=1.1, label=label)
+        tracks.set_aspect("equal", adjustable="datalim")
+        tracks.set(xlabel="to port [ship lengths]", ylabel="ahead [ship lengths]", title="turning")
+        headings.set(xlabel="time [s]", ylabel="heading, to port [deg]", title="zigzag")
+        figure.legend(loc="outside upper center", ncols=len(angles), title="thruster angle")
     return figure

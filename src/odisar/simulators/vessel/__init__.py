@@ -6,8 +6,14 @@ manoeuvres in labelled weather (``runs``). Every array has a last axis ``run``; 
 runs, so a recording doesn't depend on which others are made beside it.
 """
 
-from odisar.simulators.vessel.plausibility import plausibility_table
+from odisar.simulators.vessel.plausibility import plausibility_table, trial_traces
 from odisar.simulators.vessel.runs import simulate_vessel
 from odisar.simulators.vessel.validation import sea_trial_table, validation_traces
 
-__all__ = ["plausibility_table", "sea_trial_table", "simulate_vessel", "validation_traces"]
+__all__ = [
+    "plausibility_table",
+    "sea_trial_table",
+    "simulate_vessel",
+    "trial_traces",
+    "validation_traces",
+]

@@ -79,6 +79,34 @@ def plausibility_table(config: VesselSimulatorConfig, base_seed: int) -> pd.Data
     return table
 
 
+def trial_traces(config: VesselSimulatorConfig) -> pd.DataFrame:
+    """Return what the ferry did in the calm-water trials, to be drawn.
+
+    Columns ``trial`` (turning or zigzag), ``angle_deg``, ``time_s`` from the first order on,
+    ``ahead`` and ``aside`` [ship lengths, to port], ``turned_deg`` (to port) and ``order_deg``.
+    """
+    trials = _run_trials(config)
+    time_s = np.arange(len(trials.states)) * config.step_s
+    tables = []
+    for run in range(1, 1 + 2 * len(_ANGLES_DEG)):
+        north, east, _, heading, *_ = trials.states[:, :, run].T
+        is_turn = run <= len(_ANGLES_DEG)
+        tables.append(
+            pd.DataFrame(
+                {
+                    "trial": "turning" if is_turn else "zigzag",
+                    "angle_deg": _ANGLES_DEG[(run - 1) % len(_ANGLES_DEG)],
+                    "time_s": time_s,
+                    "ahead": (north - north[0]) / config.ferry.length_m,
+                    "aside": -(east - east[0]) / config.ferry.length_m,
+                    "turned_deg": -np.rad2deg(heading - heading[0]),
+                    "order_deg": trials.orders_deg[:, run],
+                }
+            )
+        )
+    return pd.concat(tables, ignore_index=True)
+
+
 _Row = tuple[str, float, float, str, float, float]
 
 
