@@ -28,7 +28,6 @@ SECTIONS = (
     "evaluation",
     "report",
     "simulators",
-    "sources",
 )
 OVERALL = "overall"
 
