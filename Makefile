@@ -78,4 +78,4 @@ format: $(INSTALLED)  ## Format code, strip notebooks
 	@$(BIN)/nbstripout notebooks/*.ipynb
 
 clean:  ## Remove what the pipeline made; recordings, runs and .venv stay
-	rm -rf build workspaces reports/report.html reports/notebooks
+	rm -rf build workspaces reports/report.html

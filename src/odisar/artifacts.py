@@ -66,11 +66,6 @@ class Workspace:
         return self.root / "reports/metrics.json"
 
     @property
-    def executed_notebooks(self) -> Path:
-        """Notebooks with outputs, and their HTML."""
-        return self.root / "reports/notebooks"
-
-    @property
     def report(self) -> Path:
         """The one-file report."""
         return self.root / "reports/report.html"

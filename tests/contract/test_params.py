@@ -7,6 +7,8 @@ from ruamel.yaml import YAML
 
 from odisar.config.loader import ConfigView, load_config, parse_config
 from odisar.errors import OdisarError
+from odisar.simulators.vessel.runs import CHANNELS
+from odisar.sources.gunnerus import CHANNEL_NAMES
 from odisar.workspaces import merge
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -91,3 +93,13 @@ def test_a_file_that_is_no_mapping_is_refused(tmp_path, text):
     (tmp_path / "params.yaml").write_text(text)
     with pytest.raises(OdisarError, match=r"params\.yaml"):
         load_config(tmp_path)
+
+
+def test_the_real_vessels_channels_are_those_of_its_conversion():
+    config = load_config(ROOT)
+    assert tuple(config.cases["gunnerus"].channel_names) == tuple(CHANNEL_NAMES)
+    assert config.cases["gunnerus"].rate_hz == config.sources.gunnerus.rate_hz
+
+
+def test_the_simulated_vessels_channels_are_those_of_its_simulator():
+    assert tuple(load_config(ROOT).cases["vessel"].channel_names) == tuple(CHANNELS)
