@@ -56,7 +56,7 @@ report: $(INSTALLED)  ## Execute the notebooks and write reports/report.html
 ui: $(INSTALLED)  ## Browse runs in MLflow on http://127.0.0.1:5000
 	@$(ODISAR) init-store
 	@MLFLOW_SERVER_ENABLE_JOB_EXECUTION=false $(BIN)/mlflow server --host 127.0.0.1 --port 5000 --workers 1 \
-		--backend-store-uri sqlite:///$(CURDIR)/mlflow.db --artifacts-destination $(CURDIR)/mlartifacts
+		--backend-store-uri "sqlite:///$(CURDIR)/mlflow.db" --artifacts-destination "$(CURDIR)/mlartifacts"
 
 lab: $(INSTALLED)  ## Open the notebooks in JupyterLab on loopback
 	@$(BIN)/jupyter lab --ip 127.0.0.1 notebooks
@@ -77,5 +77,5 @@ format: $(INSTALLED)  ## Format code, strip notebooks
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/nbstripout notebooks/*.ipynb
 
-clean:  ## Remove what the pipeline made; recordings, runs and .venv stay
+clean:  ## Remove build/, workspaces/ and the report; data/, MLflow runs and .venv stay
 	rm -rf build workspaces reports/report.html

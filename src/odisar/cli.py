@@ -92,7 +92,7 @@ def _init_store(root: Path, _options: argparse.Namespace) -> None:
 
 
 def _report(root: Path, _options: argparse.Namespace) -> None:
-    from odisar.stages.publish import rebuild_report
+    from odisar.reproduce import rebuild_report
 
     rebuild_report(root)
 

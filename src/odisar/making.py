@@ -1,6 +1,5 @@
 """Make the recordings of a workspace and hold them against ``data.dvc``."""
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -10,32 +9,33 @@ from odisar.config.loader import Config, load_config
 from odisar.errors import OdisarError
 from odisar.recordings.quality import Finding, raise_on_errors
 from odisar.recordings.reader import read_case
+from odisar.recordings.recipe import recipe_file
 from odisar.recordings.writer import write_recordings
 from odisar.simulators.vessel.runs import simulate_vessel
 from odisar.sources.gunnerus import make_gunnerus
-
-#: Says what simulated recordings were made from, so that changed parameters make them anew.
-_STAMPS = "build/recordings-made-from.json"
 
 
 def make_recordings(root: Path) -> None:
     """Make what the active cases lack; recordings that are there are left as they are.
 
-    A simulated case is made again when its simulator's parameters or the seed have changed since.
-    Raises OdisarError for a case that has neither recordings nor a way to make them.
+    Simulated recordings are made again when the simulator's parameters have changed since. Raises
+    OdisarError for a case that has neither recordings nor a way to make them.
     """
     config = load_config(root)
-    stamps_path = root / _STAMPS
-    stamps = json.loads(stamps_path.read_text()) if stamps_path.exists() else {}
     for name in config.active_cases:
-        folder = root / config.cases[name].source.folder
-        recipe = _recipe(config, name)
-        if _has_recordings(folder) and stamps.get(name, recipe) == recipe:
+        source = config.cases[name].source
+        folder = root / source.folder
+        if source.maker == "ferry-simulator":
+            _simulate(config, name, folder, recipe_file(root))
+        elif _has_recordings(folder):
             continue
-        _make_case(config, name, root, folder)
-        stamps[name] = recipe
-        stamps_path.parent.mkdir(parents=True, exist_ok=True)
-        stamps_path.write_text(json.dumps(stamps, indent=1) + "\n")
+        elif source.maker == "gunnerus-trial":
+            make_gunnerus(config.sources.gunnerus, root, folder)
+        else:
+            raise OdisarError(
+                f"case {name!r}: there are no recordings in {source.folder}; put its CSV files "
+                "there (see the README, 'Your own recordings')"
+            )
 
 
 def track_recordings(root: Path, *, accept: bool) -> None:
@@ -80,21 +80,24 @@ def run_dvc(root: Path, *arguments: str) -> str:
     return done.stdout.strip()
 
 
-def _make_case(config: Config, name: str, root: Path, folder: Path) -> None:
-    case = config.cases[name]
-    if name == "vessel":
-        print(f"simulating the recordings of {name} into {case.source.folder} ...")  # noqa: T201
-        _remove_listed(folder)
-        recordings = simulate_vessel(config.simulators.vessel, config.seed)
-        written = write_recordings(folder, recordings, case.channel_names)
-        print(f"  {len(written)} files")  # noqa: T201
-    elif name == "gunnerus":
-        make_gunnerus(config.sources.gunnerus, root, folder)
-    else:
-        raise OdisarError(
-            f"case {name!r}: there are no recordings in {case.source.folder}; put its CSV files "
-            "there (see the README, 'Your own recordings')"
-        )
+def _simulate(config: Config, name: str, folder: Path, recipe_path: Path) -> None:
+    recipes = json.loads(recipe_path.read_text()) if recipe_path.exists() else {}
+    wanted, found = config.simulators.recipe(), recipes.get(name)
+    if _has_recordings(folder):
+        if found == wanted:
+            return
+        if found is None:
+            raise OdisarError(
+                f"{config.cases[name].source.folder} holds recordings, but {recipe_path.name} does "
+                f"not say that the simulator made them; move them away, or give case {name!r} "
+                "another source.folder"
+            )
+    print(f"simulating the recordings of {name} ...")  # noqa: T201
+    _remove_listed(folder)
+    recordings = simulate_vessel(config.simulators.vessel, config.simulators.seed)
+    written = write_recordings(folder, recordings, config.cases[name].channel_names)
+    recipe_path.write_text(json.dumps(recipes | {name: wanted}, indent=1) + "\n")
+    print(f"  {len(written)} files")  # noqa: T201
 
 
 def _remove_listed(folder: Path) -> None:
@@ -104,13 +107,6 @@ def _remove_listed(folder: Path) -> None:
         return
     for line in index.read_text(encoding="utf-8").splitlines()[1:]:
         (folder / f"{line.partition(',')[0]}.csv").unlink(missing_ok=True)
-
-
-def _recipe(config: Config, name: str) -> str:
-    if name != "vessel":
-        return "recorded"
-    text = f"{config.seed} {config.simulators.vessel.model_dump_json()}"
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _has_recordings(folder: Path) -> bool:

@@ -15,21 +15,28 @@ from odisar.tracking import ROOT_VARIABLE, initialise_store, tracking_root
 
 def reproduce(root: Path) -> None:
     """Run everything that is not up to date in the workspace ``root``, and print what came out."""
+    run_pipeline(root)
+    print_results(root)
+
+
+def rebuild_report(root: Path) -> None:
+    """Bring the report up to date, notebooks included, and print where it is."""
+    run_pipeline(root)
+    print(f"report: {_shown(Workspace(root).report)}")  # noqa: T201
+
+
+def run_pipeline(root: Path) -> None:
+    """Make and check recordings, create the MLflow store, run what is not up to date."""
     make_recordings(root)
     track_recordings(root, accept=False)
     initialise_store(root)
     # The pipeline says `python`: it must be this one, whether or not .venv is activated.
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-    done = subprocess.run(
-        [sys.executable, "-m", "dvc", "repro"],
-        cwd=root,
-        env=os.environ | {"PATH": path},
-        check=False,
-    )
+    command = [sys.executable, "-m", "dvc", "repro"]
+    done = subprocess.run(command, cwd=root, env=os.environ | {"PATH": path}, check=False)
     if done.returncode:
         raise OdisarError("the pipeline stopped; what went wrong stands above")
     ensure_published(root)
-    print_results(root)
 
 
 def reproduce_profile(root: Path, workspace: Path) -> None:

@@ -7,6 +7,7 @@ parent, so that cached and repeated stages neither lose nor double a run.
 
 import hashlib
 import os
+import re
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -20,6 +21,10 @@ from mlflow.tracking import MlflowClient
 
 #: Names another folder than the workspace as the home of the MLflow store.
 ROOT_VARIABLE = "ODISAR_TRACKING_ROOT"
+#: Set on the parent run by the last step, with the key of what was published.
+PUBLISHED_TAG = "odisar.published"
+#: Status of a run that came to its end.
+FINISHED = RunStatus.to_string(RunStatus.FINISHED)
 _CONTENT_TAG, _STAGE_TAG, _PARENT_TAG = "odisar.content", "DVC_STAGE", "mlflow.parentRunId"
 _NAME_TAG, _NOTE_TAG = "mlflow.runName", "mlflow.note.content"
 #: DVC runs queued experiments in a temporary copy below the repository.
@@ -61,14 +66,15 @@ class TrackedRun:
 
     def params(self, values: Mapping[str, Any]) -> None:
         """Log parameters; nested mappings get dotted names."""
-        flat = [Param(k, str(v)[:_PARAM_LIMIT]) for k, v in flatten(values).items()]
+        flat = [Param(_safe(k), str(v)[:_PARAM_LIMIT]) for k, v in flatten(values).items()]
         for start in range(0, len(flat), 100):
             self.client.log_batch(self.run_id, params=flat[start : start + 100])
 
     def metrics(self, values: Mapping[str, Any], step: int = 0) -> None:
         """Log numbers, at an epoch where there is one; nested mappings get dotted names."""
         started = self.client.get_run(self.run_id).info.start_time
-        batch = [Metric(k, float(v), started + step, step) for k, v in flatten(values).items()]
+        flat = {_safe(k): float(v) for k, v in flatten(values).items()}
+        batch = [Metric(k, v, started + step, step) for k, v in flat.items()]
         for start in range(0, len(batch), 1000):
             self.client.log_batch(self.run_id, metrics=batch[start : start + 1000])
 
@@ -131,6 +137,7 @@ class Tracker:
         A stage that fails marks its own run and the parent as failed.
         """
         parent = self.parent()
+        parent.tags({PUBLISHED_TAG: ""})
         self._drop({_STAGE_TAG: name}, parent.run_id)
         self.client.update_run(parent.run_id, RunStatus.to_string(RunStatus.RUNNING))
         run_id = _start(self.client, self._experiment, name, parent.run_id, {_STAGE_TAG: name})
@@ -142,7 +149,7 @@ class Tracker:
 
     def finish(self) -> None:
         """Mark the parent as finished."""
-        self.client.set_terminated(self.parent().run_id, RunStatus.to_string(RunStatus.FINISHED))
+        self.client.set_terminated(self.parent().run_id, FINISHED)
 
     def stage_seconds(self) -> dict[str, float]:
         """Return how long each stage of this content took, by the stage's name."""
@@ -203,6 +210,11 @@ def flatten(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def _safe(name: str) -> str:
+    """Return a name that MLflow takes: a channel may be called ``v [m/s]``."""
+    return re.sub(r"[^A-Za-z0-9_. -]", "_", name)
+
+
 def _start(
     client: MlflowClient,
     experiment: str,
@@ -221,7 +233,7 @@ def _finished(client: MlflowClient, run_id: str) -> Iterator[TrackedRun]:
     except BaseException:
         client.set_terminated(run_id, RunStatus.to_string(RunStatus.FAILED))
         raise
-    client.set_terminated(run_id, RunStatus.to_string(RunStatus.FINISHED))
+    client.set_terminated(run_id, FINISHED)
 
 
 def _git(root: Path, *arguments: str) -> str:

@@ -12,7 +12,7 @@ from odisar.stages.runner import STAGES
 ROOT = Path(__file__).resolve().parent.parent.parent
 PIPELINE = YAML(typ="safe").load((ROOT / "dvc.yaml").read_text())["stages"]
 #: Named in no stage: they carry a stage but cannot change its outcome.
-PLUMBING = {"artifacts.py", "errors.py", "seeding.py", "tracking.py", "__init__.py"}
+PLUMBING = {"errors.py", "tracking.py", "__init__.py"}
 
 
 def imported_files(module: str) -> set[Path]:

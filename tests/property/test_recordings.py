@@ -30,7 +30,7 @@ def make_case(splits=None, faults=None):
     ]  # fmt: skip
     return Case(
         title="",
-        source={"folder": "folder", "time_column": "time_s", "max_recordings": 50},
+        source={"folder": "folder", "maker": "none", "time_column": "time_s", "max_recordings": 50},
         rate_hz=2.0,
         max_gap_s=0.75,
         channels=channels,
@@ -41,7 +41,7 @@ def make_case(splits=None, faults=None):
         short_lead_s=0.5,
         guard_start_s=10.0,
         guard_end_s=10.0,
-        groups={"overall": {}, "group_by": [], "apart": []},
+        groups={"overall": {}, "group_by": [], "apart": [], "with_clean": []},
         faults=faults,
         range_rules=[],
     )  # fmt: skip
@@ -182,6 +182,7 @@ def test_a_fault_leaves_everything_outside_its_interval_untouched(data, seed):
     faults = {
         "kinds": ["noise", "bias", "drift", "stuck", "delay"], "channels": ["y"],
         "sizes": [0.5, 2.0], "delays_s": [1.3], "start_s": 1.5, "duration_s": 4.0,
+        "shows_from_sd": 0.25,
     }  # fmt: skip
     original = recording.values.tobytes()
     for copy in inject_faults([recording], make_case(faults=faults), np.ones(2), seed):

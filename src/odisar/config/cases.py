@@ -43,9 +43,14 @@ class Channel(Section):
 
 
 class Source(Section):
-    """Where a case's recordings lie: a folder of CSV files, with or without ``recordings.csv``."""
+    """Where a case's recordings lie: a folder of CSV files, with or without ``recordings.csv``.
+
+    ``maker`` says what makes them where they are missing: the ferry simulator, the download of R/V
+    Gunnerus' sea trial, or nothing (they are yours).
+    """
 
     folder: str
+    maker: Literal["ferry-simulator", "gunnerus-trial", "none"]
     time_column: str
     max_recordings: PositiveInt
 
@@ -92,6 +97,9 @@ class Faults(Section):
 
     ``sizes`` are multiples of the channel's standard deviation over the training recordings for
     noise, bias and drift (drift: at the end of the interval); ``delays_s`` are for delay.
+    A stuck or delayed sensor differs from a sound one only while its channel moves: a copy that
+    never differs by ``shows_from_sd`` standard deviations is marked ``hidden`` in the metadata
+    column ``fault_shows``, any other ``shows``.
     """
 
     kinds: list[Literal["noise", "bias", "drift", "stuck", "delay"]]
@@ -100,6 +108,7 @@ class Faults(Section):
     delays_s: list[PositiveFloat]
     start_s: PositiveFloat
     duration_s: PositiveFloat
+    shows_from_sd: PositiveFloat
 
 
 class RangeRule(Section):
@@ -116,11 +125,14 @@ class Groups(Section):
 
     ``overall`` selects, by metadata column, the disturbed recordings that the ``overall`` rows and
     the ``group_by`` rows pool; ``apart`` names columns whose other values get rows of their own.
+    ``with_clean`` names groups whose recordings are disturbed from end to end: the undisturbed
+    test recordings join them, or there would be nothing to tell them from.
     """
 
     overall: dict[str, list[str]]
     group_by: list[str]
     apart: list[str]
+    with_clean: list[str]
 
 
 class Case(Section):
@@ -155,12 +167,29 @@ class Case(Section):
             )
         if not self.output_names:
             raise ValueError("channels: at least one state needs output: true")
+        self._check_times()
         mentioned = [rule.channel for rule in self.range_rules]
         mentioned += self.faults.channels if self.faults else []
         for name in mentioned:
             if name not in names:
                 raise ValueError(f"{name!r} is not one of the channels: {', '.join(names)}")
         return self
+
+    def _check_times(self) -> None:
+        """Raise where a block or a fault has no room for what it must hold."""
+        window_s = (self.window.context_steps + self.window.horizon_steps) / self.rate_hz
+        block_s = self.splits.block_s
+        if self.splits.kind == "cross-fit" and block_s is not None:
+            if block_s < window_s:
+                raise ValueError(
+                    f"splits.block_s={block_s:g} is shorter than a window of {window_s:g} s; "
+                    "lengthen it or shorten the window"
+                )
+            if self.faults and block_s < self.faults.start_s + self.faults.duration_s:
+                raise ValueError(
+                    f"splits.block_s={block_s:g} is shorter than faults.start_s + "
+                    "faults.duration_s; a fault would not fit into a block"
+                )
 
     @property
     def short_lead_steps(self) -> int:

@@ -65,3 +65,14 @@ class TuningConfig(Section):
     layers: list[PositiveInt]
     feedforward_dim: list[PositiveInt]
     storage: str
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.reports_per_trial > self.steps_per_trial:
+            raise ValueError(
+                f"tuning.reports_per_trial={self.reports_per_trial} is above "
+                f"tuning.steps_per_trial={self.steps_per_trial}"
+            )
+        if self.learning_rate.low >= self.learning_rate.high:
+            raise ValueError("tuning.learning_rate: low must be below high")
+        return self

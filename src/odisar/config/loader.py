@@ -1,7 +1,7 @@
 """Read ``params.yaml``, whole, before any work; every complaint at once, with the way out."""
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML
@@ -17,13 +17,16 @@ from odisar.errors import OdisarError
 
 PARAMS_FILE = "params.yaml"
 
+#: Set-ups and cases name files and metrics.
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+
 
 class PipelineConfig(Section):
     """What one run of the pipeline trains and judges, and with how many processes."""
 
     setups: list[str] = Field(min_length=1)
     workers: PositiveInt
-    accelerator: str
+    accelerator: Literal["auto", "cpu", "gpu"]
 
 
 class TrackingConfig(Section):
@@ -44,8 +47,8 @@ class Config(Section):
 
     seed: int = Field(ge=0)
     pipeline: PipelineConfig
-    setups: dict[str, Setup]
-    cases: dict[str, Case]
+    setups: dict[Name, Setup]
+    cases: dict[Name, Case]
     twin: TwinConfig
     training: TrainingConfig
     tuning: TuningConfig
@@ -71,6 +74,15 @@ class Config(Section):
                     f"setups.{name}.case: {setup.case!r} is not declared under cases; declared "
                     f"are: {', '.join(self.cases)}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _check_shapes(self) -> Self:
+        odd = [width for width in self.tuning.model_dim if width % self.twin.heads]
+        if odd:
+            raise ValueError(
+                f"tuning.model_dim: {odd} are no multiples of twin.heads={self.twin.heads}"
+            )
         for name, case in self.cases.items():
             for field in ("context_steps", "horizon_steps"):
                 steps = getattr(case.window, field)

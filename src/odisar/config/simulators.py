@@ -1,5 +1,6 @@
 """Sections for the simulators: the ferry, its weather, its manoeuvres and the fleet of runs."""
 
+import hashlib
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -232,4 +233,9 @@ class VesselSimulatorConfig(Section):
 class SimulatorsConfig(Section):
     """All simulators."""
 
+    seed: Annotated[int, Field(ge=0)]
     vessel: VesselSimulatorConfig
+
+    def recipe(self) -> str:
+        """Return the hash of everything that decides the simulated recordings but the code."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()

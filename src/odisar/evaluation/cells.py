@@ -53,9 +53,11 @@ def disturbed_cells(descriptions: Sequence[Description], groups: Groups) -> list
     """Return the cells over disturbed recordings: overall, by group, and apart.
 
     Strengths are never pooled: every cell exists once for each strength among its recordings. The
-    recordings ``apart`` obey ``overall`` in every column but the one that sets them apart.
+    recordings ``apart`` obey ``overall`` in every column but the one that sets them apart, as far
+    as they have a value there.
     """
     disturbed = [i for i, d in enumerate(descriptions) if is_disturbed(d)]
+    clean = [i for i, d in enumerate(descriptions) if not is_disturbed(d)]
     overall = [i for i in disturbed if _is_overall(descriptions[i], groups)]
     cells = _split(descriptions, OVERALL, overall)
     for column in groups.group_by:
@@ -63,10 +65,13 @@ def disturbed_cells(descriptions: Sequence[Description], groups: Groups) -> list
             chosen = [i for i in overall if descriptions[i][column] == value]
             cells += _split(descriptions, value, chosen)
     for column in groups.apart:
-        alike = [i for i in disturbed if _is_overall(descriptions[i], groups, but=column)]
+        alike = [
+            i for i in disturbed if _is_overall(descriptions[i], groups, but=column, passing=("",))
+        ]
         for value in _values(descriptions, column):
             if value not in groups.overall.get(column, []):
                 chosen = [i for i in alike if descriptions[i][column] == value]
+                chosen += clean if value in groups.with_clean else []
                 cells += _split(descriptions, value, chosen)
     return cells
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from odisar.config.cases import Case
-from odisar.recordings.schema import Interval, Recording
+from odisar.recordings.schema import UNDISTURBED, Interval, Recording
 
 
 def cut_blocks(recording: Recording, case: Case) -> list[Recording]:
     """Return the blocks of ``splits.block_s`` seconds, ``splits.block_gap_s`` apart.
 
     No block crosses a gap, and what is left of a segment after its last whole block is in none.
-    Times stay those of the recording; labels are clipped to the block. Every block is a cluster
-    of its own.
+    Times stay those of the recording; labels are clipped to the block, and a block that none of
+    them reaches is undisturbed. Every block is a cluster of its own.
     """
     block_steps = max(round((case.splits.block_s or 0.0) * case.rate_hz), 1)
     gap_s = case.splits.block_gap_s or 0.0
@@ -38,12 +38,16 @@ def _block(recording: Recording, first: int, last: int, number: int, period_s: f
         Interval(max(interval.start_s, start_s), min(interval.end_s, end_s), interval.label)
         for interval in recording.intervals
     )
+    intervals = tuple(interval for interval in clipped if interval.start_s < interval.end_s)
+    info = replace(recording.info, base_seed=name)
+    if recording.intervals and not intervals:  # disturbed, but not here
+        info = replace(info, disturbance=UNDISTURBED, components=UNDISTURBED, strength=None)
     return replace(
         recording,
         name=name,
-        info=replace(recording.info, base_seed=name),
+        info=info,
         time_s=time_s,
         values=recording.values[first:last].copy(),
-        intervals=tuple(interval for interval in clipped if interval.start_s < interval.end_s),
+        intervals=intervals,
         segments=((0, last - first),),
     )

@@ -218,7 +218,7 @@ def _check_lengths(segments: Segments, columns: Columns, case: Case, notes: Note
         )
         return
     notes.rows(
-        "the segment after a gap is shorter than one window and takes no part",
+        "the segment after a gap is shorter than context and horizon: nothing is learnt from it",
         remedy,
         [(int(columns.lines[start]), f"{stop - start} samples") for start, stop in short],
         total=len(short),

@@ -150,9 +150,9 @@ def _faulty_copy(
     column = case.channel_names.index(fault.channel)
     inside = label_times(recording.time_s, [interval])
     values = recording.values.copy()
-    values[inside, column] = _faulty_values(
-        fault, recording, inside, column, float(channel_std[column]), random
-    )
+    std = float(channel_std[column])
+    values[inside, column] = _faulty_values(fault, recording, inside, column, std, random)
+    deviation = np.abs(values[inside, column] - recording.values[inside, column]).max() / std
     return replace(
         recording,
         name=name,
@@ -162,17 +162,22 @@ def _faulty_copy(
             components="all",
             strength=None,
             base_seed=recording.info.base_seed or recording.name,
-            extra=_extra(recording.info.extra, fault),
+            extra=_extra(recording.info.extra, fault, shows=deviation >= where.shows_from_sd),
         ),
         values=values,
         intervals=(interval,),
     )
 
 
-def _extra(extra: Mapping[str, str], fault: _Fault) -> dict[str, str]:
+def _extra(extra: Mapping[str, str], fault: _Fault, *, shows: bool) -> dict[str, str]:
     unit = "s" if fault.kind == "delay" else "sd"
     size = "" if fault.amount is None else f"{fault.amount:g} {unit}"
-    return {**extra, "fault_channel": fault.channel, "fault_size": size}
+    return {
+        **extra,
+        "fault_channel": fault.channel,
+        "fault_size": size,
+        "fault_shows": "shows" if shows else "hidden",
+    }
 
 
 def _faulty_values(

@@ -32,7 +32,8 @@ def assign_splits(
 
     ``info.split`` of what is returned names its part. ``setup_select`` narrows train, validation
     and calibration, never development and test. ``fold`` is for cross-fit alone: its blocks test,
-    those of the next fold calibrate, those of the one after validate, all others train.
+    those of the next fold calibrate, those of the one after validate, all others train;
+    disturbed blocks only test.
 
     Raises
     ------
@@ -152,7 +153,8 @@ def _cross_fit(recordings: Sequence[Recording], case: Case, fold: int | None) ->
         part = {0: "test", 1: "calibration", 2: "validation"}.get(
             ((block.info.fold or 0) - fold) % folds, "train"
         )
-        parts[part].append(block)
+        if part == "test" or not block.info.is_disturbed:
+            parts[part].append(block)
     positions = dict.fromkeys(PARTS, 0)
     for recording in recordings:
         split = recording.info.split

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace, write_json
@@ -16,11 +15,11 @@ from odisar.config.loader import ConfigView
 from odisar.evaluation.alarms import calibrate_operating_threshold
 from odisar.recordings.schema import Recording
 from odisar.stages.detectors import detector_scores
-from odisar.stages.members import Member, MemberData, hours, load_member, setup_members
-from odisar.stages.parallel import run_jobs
+from odisar.stages.members import Member, MemberData, hours, load_member, pipeline_members
+from odisar.stages.parallel import run_jobs, show_progress
 from odisar.tracking import TrackedRun
 from odisar.twin.bundle import read_twin
-from odisar.twin.training import use_one_thread
+from odisar.twin.training import pick_device, use_one_thread
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "evaluation")
 
@@ -30,6 +29,7 @@ class _Job:
     config: ConfigView
     root: Path
     member: Member
+    position: int
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,8 @@ class MemberCalibration:
 def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     """Run the stage."""
     jobs = [
-        _Job(config, workspace.root, member)
-        for setup in config.pipeline.setups
-        for member in setup_members(config, setup)
+        _Job(config, workspace.root, member, number % config.pipeline.workers)
+        for number, member in enumerate(pipeline_members(config))
     ]
     calibrations = run_jobs(_calibrate, jobs, config.pipeline.workers)
     for setup in config.pipeline.setups:
@@ -135,9 +134,8 @@ def _calibrate(job: _Job) -> MemberCalibration:
     twin = read_twin(workspace.twin(job.member.name))
     scorer = Scorer(twin, config.capability.scoring_batch, pick_device(config.pipeline.accelerator))
     calibration = data.splits["calibration"]
-    scored = [
-        scorer.score(item, short_lead_steps=data.case.short_lead_steps) for item in calibration
-    ]
+    shown = show_progress(calibration, job.member.name, job.position)
+    scored = [scorer.score(item, short_lead_steps=data.case.short_lead_steps) for item in shown]
     runs = _score_runs(data, calibration, scored)
     sigma = {
         detector: sigma_threshold(
@@ -180,10 +178,3 @@ def _score_runs(
                 run = (item.info.base_seed or item.name, values[inside])
                 runs.setdefault(detector, []).append(run)
     return runs
-
-
-def pick_device(accelerator: str) -> str:
-    """Return the torch device that ``pipeline.accelerator`` asks for."""
-    if accelerator == "cpu" or not torch.cuda.is_available():
-        return "cpu"
-    return "cuda"

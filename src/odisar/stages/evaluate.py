@@ -23,14 +23,13 @@ from odisar.evaluation.tables import detection_table
 from odisar.evaluation.window_tables import attribution_table, quadrant_table
 from odisar.recordings.schema import Recording, label_times
 from odisar.seeding import derive_seed
-from odisar.stages.calibrate import pick_device
 from odisar.stages.consequence import first_consequence
 from odisar.stages.detectors import detector_scores
-from odisar.stages.members import Member, load_member, setup_members
-from odisar.stages.parallel import run_jobs
+from odisar.stages.members import Member, load_member, pipeline_members
+from odisar.stages.parallel import run_jobs, show_progress
 from odisar.tracking import TrackedRun
 from odisar.twin.bundle import read_twin
-from odisar.twin.training import use_one_thread
+from odisar.twin.training import pick_device, use_one_thread
 from odisar.windows.nearness import nearness_table
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "evaluation")
@@ -48,6 +47,7 @@ class _Job:
     config: ConfigView
     root: Path
     member: Member
+    position: int
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,8 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     """Run the stage."""
     setups = config.pipeline.setups
     jobs = [
-        _Job(config, workspace.root, member)
-        for setup in setups
-        for member in setup_members(config, setup)
+        _Job(config, workspace.root, member, number % config.pipeline.workers)
+        for number, member in enumerate(pipeline_members(config))
     ]
     done = run_jobs(_evaluate, jobs, config.pipeline.workers)
     results = {
@@ -149,7 +148,7 @@ def _evaluate(job: _Job) -> _MemberResult:
     frames: list[pd.DataFrame] = []
     assessments: list[Assessment] = []
     rows: list[dict[str, object]] = []
-    for item in data.splits["test"]:
+    for item in show_progress(data.splits["test"], member.name, job.position):
         scores = scorer.score(item, short_lead_steps=data.case.short_lead_steps)
         by_detector = detector_scores(data.case, item, scores)
         times = item.time_s[scores.positions]

@@ -4,6 +4,7 @@ import pandas as pd
 
 from odisar.artifacts import Workspace, write_table
 from odisar.config.loader import ConfigView
+from odisar.errors import OdisarError
 from odisar.recordings.quality import (
     Finding,
     quality_table,
@@ -12,12 +13,13 @@ from odisar.recordings.quality import (
     write_quality_table,
 )
 from odisar.recordings.reader import read_case
+from odisar.recordings.recipe import check_recipe
 from odisar.recordings.schema import Recording
 from odisar.recordings.store import write_store
 from odisar.stages.members import hours, load_member, pipeline_members
 from odisar.tracking import TrackedRun
 
-PARAMS = ("seed", "pipeline", "setups", "cases")
+PARAMS = ("seed", "pipeline", "setups", "cases", "simulators")
 
 
 def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
@@ -26,6 +28,8 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     recordings: dict[str, list[Recording]] = {}
     tables: list[pd.DataFrame] = []
     for name in config.active_cases:
+        if config.cases[name].source.maker == "ferry-simulator":
+            check_recipe(workspace.root, name, config.simulators.recipe())
         result = read_case(name, config.cases[name], workspace.root)
         findings.extend(result.findings)
         recordings[name] = result.recordings
@@ -37,6 +41,7 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     write_quality_table(workspace.preprocess / "quality.csv", quality)
     write_findings(workspace.preprocess / "findings.json", findings)
     splits = split_overview(config, workspace)
+    require_disturbed(splits)
     write_table(workspace.preprocess / "splits.csv", splits)
     print_warnings(findings)
     tracked.metrics({"recordings": len(quality), "warnings": len(findings)})
@@ -62,6 +67,16 @@ def split_overview(config: ConfigView, workspace: Workspace) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows).astype({"fold": "Int64"})
+
+
+def require_disturbed(splits: pd.DataFrame) -> None:
+    """Raise OdisarError for a set-up that nothing disturbed would test."""
+    test = splits[splits.split == "test"].groupby("setup").disturbed.sum()
+    for setup in test.index[test == 0]:
+        raise OdisarError(
+            f"set-up {setup!r}: no test recording holds a disturbance, so no detector could be "
+            "judged; label disturbed intervals in labels.csv, or declare `faults` for the case"
+        )
 
 
 def print_warnings(findings: list[Finding]) -> None:

@@ -4,10 +4,6 @@ The report says when and how long, so it differs from run to run and is no outpu
 what it is made from is.
 """
 
-import os
-import subprocess
-import sys
-from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -18,9 +14,18 @@ from odisar.errors import OdisarError
 from odisar.report.load import report_folder
 from odisar.report.page import RunFacts, page_content, render_page
 from odisar.report.simulator_checks import show_sea_trial
-from odisar.stages.report import SIMULATED_CASE
-from odisar.stages.runner import STAGES
-from odisar.tracking import TrackedRun, Tracker, content_key, data_hash, flatten, git_revision
+from odisar.stages.report import uses_ferry_simulator
+from odisar.stages.runner import STAGES, plain, run_stage
+from odisar.tracking import (
+    FINISHED,
+    PUBLISHED_TAG,
+    TrackedRun,
+    Tracker,
+    content_key,
+    data_hash,
+    flatten,
+    git_revision,
+)
 
 PARAMS = (
     "seed",
@@ -38,9 +43,6 @@ PARAMS = (
     "sources",
 )
 
-#: Set on the parent run by the last step, with the key of what was published.
-_PUBLISHED_TAG = "odisar.published"
-
 
 def run(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
     """Run the stage; a second time it changes nothing but the report's time."""
@@ -56,7 +58,6 @@ def run(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
     parent.artifact(workspace.figures, "figures")
     parent.artifact(workspace.report)
     _mark(parent, workspace)
-    tracker.finish()
 
 
 def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
@@ -67,7 +68,7 @@ def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> 
     facts = run_facts(config, workspace, tracker)
     body = path.read_text(encoding="utf-8")
     trial = None
-    if SIMULATED_CASE in config.active_cases:
+    if uses_ferry_simulator(config):
         picture = workspace.root / "build/sea-trial.png"
         trial = show_sea_trial(config.sources.gunnerus.file, workspace.root, picture)
     page = render_page(config.report.title, body, facts, flatten(configured(config)), trial)
@@ -88,18 +89,6 @@ def run_facts(config: ConfigView, workspace: Workspace, tracker: Tracker) -> Run
     )
 
 
-def rebuild_report(root: Path) -> None:
-    """Bring the report up to date, notebooks included, and print where it is."""
-    command = [sys.executable, "-m", "dvc", "repro", "report", "publish"]
-    # The pipeline says `python`: it must be this one, whether or not .venv is activated.
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-    done = subprocess.run(command, cwd=root, env=os.environ | {"PATH": path}, check=False)
-    if done.returncode:
-        raise OdisarError("the report could not be made; what went wrong stands above")
-    ensure_published(root)
-    print(f"report: {Workspace(root).report}")  # noqa: T201
-
-
 def ensure_published(root: Path) -> None:
     """Publish again where DVC had no reason to, but page or parent run are not of this content.
 
@@ -110,21 +99,19 @@ def ensure_published(root: Path) -> None:
     workspace = Workspace(root)
     tracker = Tracker(root, config.tracking.experiment)
     found = tracker.find_parent()
-    is_published = found is not None and _PUBLISHED_TAG in found.data.tags
-    if not is_published or page_content(workspace.report) != content_key(root):
-        run(ConfigView(config, PARAMS), workspace, tracker)
+    key = content_key(root)
+    is_complete = (
+        found is not None
+        and found.data.tags.get(PUBLISHED_TAG) == key
+        and found.info.status == FINISHED
+    )
+    if not is_complete or page_content(workspace.report) != key:
+        run_stage("publish", root)
 
 
 def configured(config: ConfigView) -> dict[str, Any]:
     """Return every section as plain mappings."""
-    return {name: _plain(getattr(config, name)) for name in PARAMS}
-
-
-def _plain(section: object) -> object:
-    if isinstance(section, Mapping):
-        return {key: _plain(value) for key, value in section.items()}
-    dump = getattr(section, "model_dump", None)
-    return dump() if dump else section
+    return {name: plain(getattr(config, name)) for name in PARAMS}
 
 
 def _duration(seconds: float | None) -> str:
@@ -137,4 +124,4 @@ def _duration(seconds: float | None) -> str:
 def _mark(parent: TrackedRun, workspace: Workspace) -> None:
     key = content_key(workspace.root)
     write_json(workspace.root / "build/published.json", {"content": key})
-    parent.tags({_PUBLISHED_TAG: key})
+    parent.tags({PUBLISHED_TAG: key})

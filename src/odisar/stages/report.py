@@ -43,9 +43,6 @@ PARAMS = (
     "simulators",
 )
 
-#: The case whose recordings come from the vessel simulator.
-SIMULATED_CASE = "vessel"
-
 
 def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     """Run the stage; the same results give the same bytes."""
@@ -57,9 +54,11 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
         executing = pool.submit(execute_notebooks, workspace.root, folder / "notebooks")
         figures = draw_figures(results, workspace.figures)
         plausible = None
-        if SIMULATED_CASE in config.active_cases:
+        if uses_ferry_simulator(config):
             figures.append(_draw_trials(config, workspace))
-            plausible = plausibility(plausibility_table(config.simulators.vessel, config.seed))
+            plausible = plausibility(
+                plausibility_table(config.simulators.vessel, config.simulators.seed)
+            )
         notebooks = executing.result()
     body = render_body(results, figures, notebooks, plausible)
     (folder / "body.html").write_text(body, encoding="utf-8")
@@ -113,3 +112,8 @@ def _draw_trials(config: ConfigView, workspace: Workspace) -> Drawn:
     save_figure(standard_trials(trial_traces(config.simulators.vessel)), path)
     caption = "The simulated ferry in calm water: turning circles and zigzags at four angles."
     return Drawn("simulator", "", caption, path)
+
+
+def uses_ferry_simulator(config: ConfigView) -> bool:
+    """Whether a case of the pipeline is simulated."""
+    return any(config.cases[name].source.maker == "ferry-simulator" for name in config.active_cases)

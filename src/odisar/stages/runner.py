@@ -24,16 +24,19 @@ def run_stage(name: str, root: Path) -> None:
     view = ConfigView(config, stage.PARAMS)
     workspace = Workspace(root)
     tracker = Tracker(root, config.tracking.experiment)
-    if name == "publish":
-        stage.run(view, workspace, tracker)
-        return
     with tracker.stage(name) as tracked:
-        tracked.params({section: _plain(getattr(config, section)) for section in stage.PARAMS})
-        stage.run(view, workspace, tracked)
+        tracked.params({section: plain(getattr(config, section)) for section in stage.PARAMS})
+        if name == STAGES[-1]:  # the last stage completes the parent run
+            stage.run(view, workspace, tracker)
+        else:
+            stage.run(view, workspace, tracked)
+    if name == STAGES[-1]:
+        tracker.finish()
 
 
-def _plain(section: object) -> object:
+def plain(section: object) -> object:
+    """Return a section of the configuration as plain mappings and values."""
     if isinstance(section, dict):
-        return {key: _plain(value) for key, value in section.items()}
+        return {key: plain(value) for key, value in section.items()}
     dump = getattr(section, "model_dump", None)
     return dump() if dump else section

@@ -54,7 +54,7 @@ def _train(job: _Job) -> dict[str, Any]:
     use_one_thread()
     workspace, member, config = Workspace(job.root), job.member, job.config
     data = load_member(config, workspace, member)
-    tuned = read_json(workspace.tuned(member.setup))["tuned"]
+    tuned = read_json(workspace.tuned(member.setup))["members"][member.name]["tuned"]
     plan = tuned_plan(training_plan(config, member), tuned)
     validation = data.windows("validation", stride_steps=config.training.validation_stride_steps)
     train = data.windows("train")

@@ -1,13 +1,18 @@
-"""Search each set-up's shape and learning rate, by its own validation recordings."""
+"""Search shape and learning rate, for each member by its own validation recordings.
+
+A cross-fitted set-up has a study for each fold: one study for all would have seen, in its training
+and validation blocks, the blocks that other folds are tested on.
+"""
 
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from odisar.artifacts import Workspace, write_json
 from odisar.config.loader import ConfigView
 from odisar.seeding import derive_seed
-from odisar.stages.members import Member, MemberData, load_member, setup_members
+from odisar.stages.members import Member, MemberData, load_member, pipeline_members
 from odisar.stages.parallel import run_jobs
 from odisar.tracking import TrackedRun, content_key
 from odisar.twin.training import TrainingPlan, use_one_thread
@@ -28,29 +33,34 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     """Run the stage; a killed search goes on where it was."""
     key = content_key(workspace.root)
     scratch = workspace.scratch / f"tune-{key}"
+    storage = config.tuning.storage
     jobs = []
-    for setup in config.pipeline.setups:
-        # A cross-fitted set-up is tuned on its first fold: one shape for all of its twins.
-        member = setup_members(config, setup)[0]
-        storage = config.tuning.storage
-        journal = str(scratch / f"{setup}.journal") if storage == "journal" else storage
+    for member in pipeline_members(config):
+        journal = str(scratch / f"{member.name}.journal") if storage == "journal" else storage
         jobs.append(_Job(config, workspace.root, member, journal))
     results = run_jobs(_tune, jobs, config.pipeline.workers)
-    for job, result in zip(jobs, results, strict=True):
-        setup = job.member.setup
-        write_json(
-            workspace.tuned(setup),
-            {
-                "configured": result.trials[0],
-                "tuned": result.best,
-                "best_validation_forecast_mse": result.best_validation_mse,
-                "trials": result.trials,
-            },
-        )
+    for setup in config.pipeline.setups:
+        studies = {
+            job.member.name: result
+            for job, result in zip(jobs, results, strict=True)
+            if job.member.setup == setup
+        }
+        content = {name: _described(result) for name, result in studies.items()}
+        write_json(workspace.tuned(setup), {"members": content})
         tracked.artifact(workspace.tuned(setup))
-        tracked.metrics({f"{setup}.best_validation_forecast_mse": result.best_validation_mse})
-        _track_trials(tracked, setup, result)
+        for name, result in studies.items():
+            tracked.metrics({f"{name}.best_validation_forecast_mse": result.best_validation_mse})
+            _track_trials(tracked, name, result)
     shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _described(result: TuningResult) -> dict[str, Any]:
+    return {
+        "configured": result.trials[0],
+        "tuned": result.best,
+        "best_validation_forecast_mse": result.best_validation_mse,
+        "trials": result.trials,
+    }
 
 
 def training_plan(config: ConfigView, member: Member) -> TrainingPlan:
@@ -64,15 +74,15 @@ def _tune(job: _Job) -> TuningResult:
     data: MemberData = load_member(job.config, Workspace(job.root), job.member)
     stride = job.config.training.validation_stride_steps
     windows = data.windows("train"), data.windows("validation", stride_steps=stride)
-    study = f"{job.member.setup}-{content_key(job.root)}"
+    study = f"{job.member.name}-{content_key(job.root)}"
     plan = training_plan(job.config, job.member)
     return tune_twin(plan, job.config.tuning, windows, job.storage, study)
 
 
-def _track_trials(tracked: TrackedRun, setup: str, result: TuningResult) -> None:
+def _track_trials(tracked: TrackedRun, member: str, result: TuningResult) -> None:
     for trial in result.trials:
-        name = f"{setup} trial {trial['number']}"
-        with tracked.child(name, {"setup": setup, "trial.state": trial["state"]}) as run:
+        name = f"{member} trial {trial['number']}"
+        with tracked.child(name, {"member": member, "trial.state": trial["state"]}) as run:
             run.params({k: v for k, v in trial.items() if "." in k})
             if trial["validation_forecast_mse"] is not None:
                 run.metrics({"validation_forecast_mse": trial["validation_forecast_mse"]})

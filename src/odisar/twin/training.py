@@ -11,6 +11,7 @@ import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 
 from odisar.config.learning import TrainingConfig, TwinConfig
+from odisar.errors import OdisarError
 from odisar.seeding import derive_seed
 from odisar.twin.checkpoints import SafetensorsCheckpointIO, read_checkpoint
 from odisar.twin.lightning_module import VALIDATION_METRIC, TwinModule
@@ -57,6 +58,19 @@ def use_one_thread() -> None:
     warnings.filterwarnings("ignore", message=".*isinstance.treespec, LeafSpec.*")
 
 
+def pick_device(accelerator: str) -> str:
+    """Return ``cuda`` or ``cpu`` as ``pipeline.accelerator`` asks for.
+
+    Raises OdisarError where a GPU is asked for and there is none.
+    """
+    if accelerator == "gpu" and not torch.cuda.is_available():
+        raise OdisarError(
+            "pipeline.accelerator=gpu, but torch finds no CUDA GPU; say auto or cpu, or install a "
+            "GPU build of torch (see the README)"
+        )
+    return "cuda" if accelerator != "cpu" and torch.cuda.is_available() else "cpu"
+
+
 def build_module(plan: TrainingPlan, windows: WindowSet) -> TwinModule:
     """Return a fresh module whose weights depend on the plan's seed alone."""
     channels = windows.samples.shape[1]
@@ -88,7 +102,7 @@ def build_trainer(
 ) -> L.Trainer:
     """Return a trainer without its own files, bars and checkpoints: the callbacks bring them."""
     return L.Trainer(
-        accelerator=plan.accelerator,
+        accelerator=pick_device(plan.accelerator),
         devices=1,
         max_epochs=plan.training.epochs,
         gradient_clip_val=plan.training.gradient_clip,

@@ -4,6 +4,8 @@ Trial 0 is the configured (published) values. Resuming gives what an unbroken se
 sampler of a trial is seeded by how many trials have finished before it.
 """
 
+import math
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from optuna.trial import FrozenTrial, TrialState
 from optuna_integration import PyTorchLightningPruningCallback
 
 from odisar.config.learning import TrainingConfig, TuningConfig, TwinConfig
+from odisar.errors import OdisarError
 from odisar.seeding import derive_seed
 from odisar.twin.lightning_module import VALIDATION_METRIC
 from odisar.twin.progress import EpochHistory
@@ -62,6 +65,12 @@ def tune_twin(
             n_startup_trials=max(2, tuning.trials // 2),
         )
         study.optimize(lambda trial: _objective(trial, plan, tuning, windows), n_trials=1)
+        _show_progress(study, study_name, tuning.trials)
+    if not study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)):
+        raise OdisarError(
+            f"study {study_name}: every trial diverged or was pruned; lower "
+            "training.learning_rate and tuning.learning_rate"
+        )
     return TuningResult(
         best=study.best_params,
         best_validation_mse=study.best_value,
@@ -114,7 +123,10 @@ def _objective(
     pruning = PyTorchLightningPruningCallback(trial, monitor=VALIDATION_METRIC)
     trainer = build_trainer(trial_plan, [history, pruning])
     trainer.fit(build_module(trial_plan, windows[0]), datamodule=build_data(trial_plan, *windows))
-    return min(row[VALIDATION_METRIC] for row in history.rows)
+    error = min(row[VALIDATION_METRIC] for row in history.rows)
+    if not math.isfinite(error):  # diverged: a finished trial, or it would be tried for ever
+        raise optuna.TrialPruned
+    return error
 
 
 def _configured_values(plan: TrainingPlan) -> dict[str, Any]:
@@ -135,6 +147,15 @@ def _requeue_interrupted(study: optuna.Study, plan: TrainingPlan) -> None:
     states = [trial.state for trial in study.trials]
     if states and TrialState.WAITING not in states and not _count_finished(study):
         study.enqueue_trial(_configured_values(plan))
+
+
+def _show_progress(study: optuna.Study, name: str, trials: int) -> None:
+    last = study.trials[-1]
+    error = "-" if last.value is None else f"{last.value:.4f}"
+    state = last.state.name.lower()
+    sys.stderr.write(
+        f"{name}: trial {_count_finished(study)}/{trials}, validation {error} ({state})\n"
+    )
 
 
 def _trial_row(trial: FrozenTrial) -> dict[str, Any]:

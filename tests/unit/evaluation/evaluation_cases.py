@@ -21,7 +21,10 @@ CONFIG = Judging(
 )
 
 GROUPS = Groups(
-    overall={"components": ["all"]}, group_by=["disturbance", "maneuver"], apart=["components"]
+    overall={"components": ["all"]},
+    group_by=["disturbance", "maneuver"],
+    apart=["components"],
+    with_clean=[],
 )
 
 

@@ -48,7 +48,10 @@ def test_clean_recordings_are_judged_by_maneuver_but_not_by_disturbance():
 
 def test_overall_narrows_clean_recordings_where_it_can():
     groups = Groups(
-        overall={"maneuver": ["zigzag"], "components": ["all"]}, group_by=[], apart=["maneuver"]
+        overall={"maneuver": ["zigzag"], "components": ["all"]},
+        group_by=[],
+        apart=["maneuver"],
+        with_clean=[],
     )
     rows = described(
         ("zigzag", "none", "none", None), ("random", "none", "none", None), groups=groups
@@ -58,7 +61,10 @@ def test_overall_narrows_clean_recordings_where_it_can():
 
 def test_what_is_apart_obeys_overall_in_the_other_columns():
     groups = Groups(
-        overall={"maneuver": ["zigzag"], "components": ["all"]}, group_by=[], apart=["components"]
+        overall={"maneuver": ["zigzag"], "components": ["all"]},
+        group_by=[],
+        apart=["components"],
+        with_clean=[],
     )
     rows = described(
         ("zigzag", "case-1", "wind", 0.5), ("random", "case-1", "wind", 0.5), groups=groups
@@ -67,7 +73,7 @@ def test_what_is_apart_obeys_overall_in_the_other_columns():
 
 
 def test_recordings_without_a_strength_have_a_cell_of_their_own():
-    groups = Groups(overall={}, group_by=[], apart=[])
+    groups = Groups(overall={}, group_by=[], apart=[], with_clean=[])
     rows = described(
         ("waypoint", "noise", "odometry", None),
         ("waypoint", "noise", "odometry", 1.0),

@@ -29,7 +29,12 @@ def case_values() -> dict[str, Any]:
 
     return {
         "title": "a small boat",
-        "source": {"folder": "boat", "time_column": "time_s", "max_recordings": 20},
+        "source": {
+            "folder": "boat",
+            "maker": "none",
+            "time_column": "time_s",
+            "max_recordings": 20,
+        },
         "rate_hz": 1.0,
         "max_gap_s": 1.5,
         "channels": [
@@ -49,7 +54,7 @@ def case_values() -> dict[str, Any]:
         "short_lead_s": 1.0,
         "guard_start_s": 10.0,
         "guard_end_s": 10.0,
-        "groups": {"overall": {}, "group_by": [], "apart": []},
+        "groups": {"overall": {}, "group_by": [], "apart": [], "with_clean": []},
         "faults": None,
         "range_rules": [],
     }

@@ -79,7 +79,7 @@ def test_a_recording_shorter_than_a_window(boat):
 
 def test_a_short_segment_beside_a_long_one_is_a_warning(boat):
     boat.spoiled({5: ""})
-    finding = boat.one("shorter than one window")
+    finding = boat.one("shorter than context and horizon")
     assert (finding.severity, finding.row, finding.value) == ("warning", 2, "3 samples")
 
 

@@ -12,6 +12,7 @@ FAULTS = {
     "delays_s": [3.0],
     "start_s": 10.0,
     "duration_s": 20.0,
+    "shows_from_sd": 0.25,
 }
 STD = np.array([1.0, 0.5, 2.0])
 
