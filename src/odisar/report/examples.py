@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from odisar.artifacts import write_json
 from odisar.capability.scoring import Scorer
 from odisar.config.cases import Case
-from odisar.evaluation.cells import metadata_columns
+from odisar.evaluation.cells import OVERALL, describe, disturbed_cells, metadata_columns
 from odisar.evaluation.labels import merge_events
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
@@ -64,7 +64,7 @@ def recordings_table(tested: Sequence[Tested], cases: Mapping[str, Case]) -> pd.
                 **{name: info.column(name) for name in _DETAILS},
                 **{n: info.column(n) for n in metadata_columns(groups) if n != "strength"},
                 "is_disturbed": info.is_disturbed,
-                "is_overall": info.is_disturbed and _is_overall(one.recording, cases[one.setup]),
+                "is_overall": _is_overall(one.recording, cases[one.setup]),
                 "events": json.dumps(_events(one.recording)),
             }
         )
@@ -87,6 +87,7 @@ def choose_examples(
         counted = clean
     by_name = {item.name: item for item in disturbed}
     chosen = by_name.get(wanted) or max(counted, key=_force)
+    clean = [item for item in clean if item is not chosen]
     return chosen, max(clean, key=lambda item: _likeness(item, chosen), default=None)
 
 
@@ -116,10 +117,10 @@ def forecasts_table(setup: str, twin: TrainedTwin, recording: Recording) -> pd.D
     at = positions[:, None] + steps
     outputs = list(twin.spec.outputs)
     columns = {
-        "forecast": _physical(twin, output.forecast.numpy()),
-        "reconstruction": _physical(twin, output.reconstruction.numpy()),
-        "low": _physical(twin, low),
-        "high": _physical(twin, high),
+        "forecast": twin.scaler.unscale(output.forecast.numpy(), outputs),
+        "reconstruction": twin.scaler.unscale(output.reconstruction.numpy(), outputs),
+        "low": twin.scaler.unscale(low, outputs),
+        "high": twin.scaler.unscale(high, outputs),
         "truth": recording.values[at][..., outputs],
     }
     shape = columns["truth"].shape
@@ -171,8 +172,9 @@ def _events(recording: Recording) -> list[list[float]]:
 
 
 def _is_overall(recording: Recording, case: Case) -> bool:
-    chosen = case.groups.overall.items()
-    return all(recording.info.column(column) in allowed for column, allowed in chosen)
+    """Whether a recording counts in the overall rows of the result tables."""
+    cells = disturbed_cells([describe(recording.info, case.groups)], case.groups)
+    return any(cell.evaluated_on == OVERALL for cell in cells)
 
 
 def _force(recording: Recording) -> tuple[float, float]:
@@ -213,9 +215,3 @@ def _inputs(
     ahead = torch.arange(1, twin.spec.horizon_steps + 1)
     at = torch.from_numpy(positions)[:, None]
     return samples[at + back], samples[at + ahead][..., list(twin.spec.known_ahead)]
-
-
-def _physical(twin: TrainedTwin, scaled: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    outputs = list(twin.spec.outputs)
-    physical: NDArray[np.float64] = scaled * twin.scaler.std[outputs] + twin.scaler.mean[outputs]
-    return physical

@@ -2,14 +2,20 @@
 
 import pandas as pd
 
-from odisar.report.load import OVERALL, Results
-from odisar.report.picking import MONITOR, Value, at_strength, percent, pick
+from odisar.report.load import OVERALL, Results, rows_of
+from odisar.report.picking import MONITOR, Value, at_strength, lead_time_note, percent, pick
 from odisar.report.style import METRIC_NAMES, detector_name
 
-#: Variance tells windows apart if its share above the threshold differs by more than this.
+#: Variance tells windows apart if its share above the threshold differs by more than this: a
+#: choice of ours, a quarter of the windows being the least that could serve as an alarm.
 _TELLING_DIFFERENCE = 0.25
-#: AUROC below which a strength is called hard to see.
+#: AUROC below which a strength is called hard to see: every fifth pair of a disturbed and an
+#: undisturbed moment is then ranked the wrong way round.
 _WEAK_AUROC = 0.8
+#: AUROC below which a scenario is called not seen: nearer to a coin (one half) than a weak one.
+_UNSEEN_AUROC = 0.6
+#: Forecast-error detectors have names that begin so.
+_FORECAST_ERROR = "rmse"
 _COMPARED = ("auroc", "tnr_at_tpr95", "f1_ood")
 
 
@@ -19,7 +25,9 @@ def failings(results: Results, setup: str) -> list[str]:
         _below_baselines,
         _below_published,
         _weak,
+        _unseen,
         _promise,
+        _promise_by_group,
         _missed,
         _late,
         _variance,
@@ -85,6 +93,43 @@ def _weak(results: Results, setup: str) -> list[str]:
     return sentences
 
 
+def _unseen(results: Results, setup: str) -> list[str]:
+    """Name scenarios, components apart included, that the score hardly sees."""
+    table = results.detection
+    rows = table[(table.setup == setup) & (table.metric == "auroc") & (table.protocol == "P2")]
+    rows = rows[(rows.evaluated_on != OVERALL) & rows.value.notna()]
+    own = rows[rows.detector == MONITOR]
+    own = own[(own.value < _UNSEEN_AUROC) | ((own.ci_low <= 0.5) & (own.ci_high >= 0.5))]
+    own = own.sort_values("strength", kind="stable", na_position="first")
+    if own.empty:
+        return []
+    told, outdone = [], 0
+    for row in rows_of(own):
+        value = Value(row.value, row.ci_low, row.ci_high, row.published)
+        same = rows.strength.isna() if pd.isna(row.strength) else rows.strength == row.strength
+        better = _clearly_better(rows[same & (rows.evaluated_on == row.evaluated_on)], value)
+        outdone += bool(better)
+        name = f"{row.evaluated_on} {at_strength(row.strength)}".strip()
+        told.append(f"{name}: {percent(value)}{better}")
+    place = "for the others" if outdone else "there"
+    rest = f" Forecast errors are not clearly better {place}." if outdone < len(told) else ""
+    return [
+        (
+            f"Hardly seen or not at all (AUROC under P2 below {100 * _UNSEEN_AUROC:g} %, or its "
+            f"interval includes one half): {'; '.join(told)}.{rest}"
+        )
+    ]
+
+
+def _clearly_better(rows: pd.DataFrame, own: Value) -> str:
+    """Name the best forecast error whose interval lies above the monitor's; empty for none."""
+    above = rows[rows.detector.str.startswith(_FORECAST_ERROR) & (rows.ci_low > own.high)]
+    if above.empty:
+        return ""
+    best = next(rows_of(above.nlargest(1, "value")))
+    return f", {detector_name(best.detector)} clearly better with {100 * best.value:.1f} %"
+
+
 def _promise(results: Results, setup: str) -> list[str]:
     value = pick(results, setup, MONITOR, "false_alarms_per_hour")
     promised = results.config.evaluation.operating_point.promised_per_hour
@@ -114,6 +159,28 @@ def _promise_sentences(value: Value, promised: float, rate: str) -> list[str]:
     return []
 
 
+def _promise_by_group(results: Results, setup: str) -> list[str]:
+    """Name manoeuvres (or other groups) whose undisturbed recordings alarm more than promised."""
+    promised = results.config.evaluation.operating_point.promised_per_hour
+    table = results.detection
+    rows = table[(table.setup == setup) & (table.metric == "false_alarms_per_hour")]
+    rows = rows[(rows.detector == MONITOR) & (rows.evaluated_on != OVERALL)]
+    rows = rows[rows.value > promised].sort_values("value", ascending=False, kind="stable")
+    told = [
+        f"{row.evaluated_on} {row.value:.2f} per hour ({row.ci_low:.2f} to {row.ci_high:.2f}"
+        f"{', which includes the promise' if row.ci_low <= promised else ''})"
+        for row in rows_of(rows)
+    ]
+    if not told:
+        return []
+    return [
+        (
+            f"More than the promised {promised:g} false alarm per hour on undisturbed recordings "
+            f"of: {', '.join(told)}."
+        )
+    ]
+
+
 def _missed(results: Results, setup: str) -> list[str]:
     sentences = []
     for strength in results.strengths(setup):
@@ -132,19 +199,13 @@ def _late(results: Results, setup: str) -> list[str]:
     if value is None or value.value > 0:
         return []
     where = at_strength(results.strengths(setup)[-1]) or "overall"
-    if value.value > -0.5:
-        return [
-            (
-                f"{where.capitalize()} the median alarm comes at the moment at which a state has "
-                "left its calibrated range, not before."
-            )
-        ]
-    return [
-        (
-            f"{where.capitalize()} the median alarm comes {-value.value:.0f} s after a state has "
-            "left its calibrated range, not before."
-        )
-    ]
+    late_s = round(-value.value)
+    when = f"{late_s} s after" if late_s else "at the moment at which"
+    sentence = (
+        f"{where.capitalize()} the median alarm comes {when} a state has left its calibrated "
+        "range, not before."
+    )
+    return [f"{sentence} {lead_time_note(results, setup)}".strip()]
 
 
 def _variance(results: Results, setup: str) -> list[str]:
@@ -154,8 +215,9 @@ def _variance(results: Results, setup: str) -> list[str]:
     rows = table[(table.setup == setup) & (table.evaluated_on == OVERALL)]
     rows = rows[rows.strength.isna() if pd.isna(strongest) else rows.strength == strongest]
     uncertain = rows[rows.quadrant.isin(["yellow", "orange"])]
-    inside, outside = uncertain.share_of_disturbed.sum(), uncertain.share_of_undisturbed.sum()
-    if inside - outside > _TELLING_DIFFERENCE:
+    inside = uncertain.share_of_disturbed.sum(min_count=1)
+    outside = uncertain.share_of_undisturbed.sum(min_count=1)
+    if pd.isna(inside) or pd.isna(outside) or inside - outside > _TELLING_DIFFERENCE:
         return []
     return [
         (

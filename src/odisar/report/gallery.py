@@ -25,9 +25,14 @@ from odisar.report.figures.events import (
 )
 from odisar.report.figures.learning import training_curves, tuning_trials
 from odisar.report.figures.operating import operating_point
-from odisar.report.figures.quadrants import quadrant_distribution, quadrant_scatter
+from odisar.report.figures.quadrants import (
+    has_quadrants,
+    quadrant_distribution,
+    quadrant_scatter,
+)
 from odisar.report.figures.recordings import recordings_overview
 from odisar.report.load import Results
+from odisar.report.picking import lead_time_note
 from odisar.report.style import save_figure
 
 Section = Literal[
@@ -44,7 +49,10 @@ Section = Literal[
 
 @dataclass(frozen=True)
 class Plate:
-    """One figure, drawn for every set-up or for every case, if it applies."""
+    """One figure, drawn for every set-up or for every case, if it applies.
+
+    ``note`` adds to the caption what holds for one subject only.
+    """
 
     name: str
     section: Section
@@ -52,6 +60,7 @@ class Plate:
     draw: Callable[[Results, str], Figure]
     scope: Literal["setup", "case"] = "setup"
     applies: Callable[[Results, str], bool] = lambda _results, _subject: True
+    note: Callable[[Results, str], str] = lambda _results, _subject: ""
 
 
 @dataclass(frozen=True)
@@ -101,6 +110,7 @@ PLATES = (
         "Alarms at the operating point: false alarms with exact Poisson intervals, events found, "
         "delay after onset, and median time from alarm to consequence (below zero: too late).",
         operating_point,
+        note=lead_time_note,
     ),
     Plate(
         "protocols",
@@ -115,6 +125,7 @@ PLATES = (
         "Share of assessed windows in each confidence quadrant. Windows of disturbed recordings "
         "before, in and after the event count, as published.",
         quadrant_distribution,
+        applies=has_quadrants,
     ),
     Plate(
         "quadrant-scatter",
@@ -174,9 +185,12 @@ def draw_figures(results: Results, folder: Path) -> list[Drawn]:
             if plate.applies(results, subject):
                 path = folder / f"{plate.name}-{subject}.png"
                 save_figure(plate.draw(results, subject), path)
-                drawn.append(Drawn(plate.section, subject, plate.caption, path))
+                caption = f"{plate.caption} {plate.note(results, subject)}".strip()
+                drawn.append(Drawn(plate.section, subject, caption, path))
     path = folder / "tuning-trials.png"
     save_figure(tuning_trials(results), path)
     caption = "Every tuning trial's validation forecast error; no disturbed recording is looked at."
+    if any(len(results.tuning(setup)) > 1 for setup in results.setups):
+        caption += " Each fold has a study of its own; their trials stand side by side."
     drawn.append(Drawn("learning", "", caption, path))
     return drawn

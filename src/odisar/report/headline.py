@@ -28,7 +28,9 @@ def headline_table(detection: pd.DataFrame, protocol: str = "P2") -> pd.DataFram
     for (setup, detector), group in chosen.groupby(["setup", "detector"], sort=False):
         alarms = group[group.metric == "false_alarms_per_hour"]
         judged = group[group.metric != "false_alarms_per_hour"]
-        for strength, part in judged.groupby("strength", dropna=False):
+        # Without a disturbed test recording there are still false alarms to tell.
+        parts = list(judged.groupby("strength", dropna=False)) or [(float("nan"), judged)]
+        for strength, part in parts:
             values = pd.concat([part, alarms]).set_index("metric")
             row = {"set-up": setup, "strength": f"{strength:g}", "detector": detector}
             row |= {

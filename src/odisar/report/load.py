@@ -145,9 +145,10 @@ class Results:
         """History and number of windows of every member's training."""
         return read_json(self.workspace.train / "training.json")
 
-    def tuning(self, setup: str) -> dict[str, Any]:
-        """Return trials and tuned values of a set-up."""
-        return read_json(self.workspace.tuned(setup))
+    def tuning(self, setup: str) -> dict[str, dict[str, Any]]:
+        """Return trials and tuned values of a set-up by member: every fold has its own study."""
+        members: dict[str, dict[str, Any]] = read_json(self.workspace.tuned(setup))["members"]
+        return members
 
     def limits(self, setup: str) -> dict[str, dict[str, Any]]:
         """Return thresholds and calibration facts by member."""
@@ -200,11 +201,15 @@ class Results:
         return [name for name in rows.detector.unique() if name != "oracle"]
 
     def strengths(self, setup: str, evaluated_on: str = OVERALL) -> list[float]:
-        """Return the strengths at which something was detected, weakest first; NaN if none."""
+        """Return the strengths at which something was detected, weakest first.
+
+        Never empty: NaN stands for recordings without a strength, and for no recordings at all.
+        """
         rows = self.detection
         rows = rows[(rows.setup == setup) & (rows.evaluated_on == evaluated_on)]
         rows = rows[rows.metric == "auroc"]
-        return sorted(rows.strength.unique(), key=lambda value: (pd.notna(value), value))
+        found = sorted(rows.strength.unique(), key=lambda value: (pd.notna(value), value))
+        return found or [float("nan")]
 
     def scenarios(self, setup: str) -> pd.DataFrame:
         """Return what a set-up was judged on: ``evaluated_on``, ``group`` and ``is_apart``.

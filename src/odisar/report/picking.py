@@ -53,6 +53,23 @@ def pick(
     )
 
 
+def selection(results: Results, setup: str) -> str:
+    """Return what a set-up's training is narrowed to, as "maneuver random"; empty if to nothing."""
+    select = results.config.setups[setup].select
+    return "; ".join(f"{column} {', '.join(values)}" for column, values in select.items())
+
+
+def lead_time_note(results: Results, setup: str) -> str:
+    """Say what lead times of a narrowed set-up are measured against; empty for any other."""
+    kept = selection(results, setup)
+    if not kept:
+        return ""
+    return (
+        f"Lead times of {setup} are measured against the range of its own calibration recordings "
+        f"({kept} only), not of all."
+    )
+
+
 def percent(found: Value) -> str:
     """Return a share in percent with its interval."""
     text = f"{100 * found.value:.1f} %"

@@ -7,7 +7,7 @@ import pandas as pd
 
 from odisar.report.failings import failings
 from odisar.report.load import Results
-from odisar.report.picking import MONITOR, at_strength, percent, pick
+from odisar.report.picking import MONITOR, at_strength, percent, pick, selection
 from odisar.report.style import METRIC_NAMES, ORACLE
 
 
@@ -36,8 +36,7 @@ def summarise(results: Results) -> Summary:
 
 def setup_title(results: Results, setup: str) -> str:
     """Return a set-up's name and what its twin was trained on."""
-    select = results.config.setups[setup].select
-    kept = "; ".join(f"{column} {', '.join(values)}" for column, values in select.items())
+    kept = selection(results, setup)
     return f"{setup} (trained on {kept} only)" if kept else setup
 
 
@@ -118,7 +117,26 @@ def _certainty(results: Results) -> list[str]:
             f"({', '.join(few)}): the alarm threshold itself is uncertain, and so is the rate of "
             "false alarms elsewhere."
         )
-    return sentences
+    return sentences + _pooling(results)
+
+
+def _pooling(results: Results) -> list[str]:
+    """Say what an alarm threshold pooled over folds rests on."""
+    pooled = [
+        setup
+        for setup in results.setups
+        if any(limit["operating_pooled"] == 1 for limit in results.limits(setup).values())
+    ]
+    if not pooled:
+        return []
+    return [
+        (
+            f"The alarm threshold of a fold ({', '.join(pooled)}) pools the scores of its own "
+            "calibration blocks with out-of-fold scores of the other folds' calibration blocks. "
+            "None of these is one of the fold's test blocks, but the other folds' twins may have "
+            "trained on its test blocks."
+        )
+    ]
 
 
 def _range(values: Sequence[float]) -> str:

@@ -8,6 +8,7 @@ import pandas as pd
 
 from odisar.report.headline import headline_table
 from odisar.report.load import OVERALL, Results, rows_of
+from odisar.report.picking import lead_time_note
 from odisar.report.style import (
     METRIC_NAMES,
     ORACLE,
@@ -20,7 +21,8 @@ from odisar.report.style import (
 DETECTION_METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
 EVENT_METRICS = ("events_detected", "delay_p50_s", "delay_p90_s", "lead_time_p50_s")
 
-#: The paper's table of model and training parameters, by name in ``params.yaml``.
+#: The paper's table of model and training parameters, by name in ``params.yaml``. A quotation, so
+#: it stays what it is when someone changes the profile ``paper``, which no stage reads.
 PUBLISHED_PARAMETERS: dict[str, float] = {
     "twin.patch_steps": 1,
     "twin.model_dim": 64,
@@ -111,7 +113,9 @@ def scenario_tables(results: Results, setup: str) -> list[Table]:
         same = rows[rows.strength.isna() if pd.isna(strength) else rows.strength == strength]
         title = f"{setup}: by scenario"
         title += "" if pd.isna(strength) else f", strength {strength_name(strength)}"
-        tables.append(_wide(title, same, order, metrics, folded=True))
+        tables.append(
+            _wide(title, same, order, metrics, folded=True, note=lead_time_note(results, setup))
+        )
     return tables
 
 
@@ -224,15 +228,26 @@ def _percent(value: float) -> str:
 
 
 def parameters(results: Results, setup: str) -> Table:
-    """Return configured and tuned parameters of a set-up, beside the paper's where it is one."""
+    """Return configured and tuned parameters of a set-up, beside the paper's where it is one.
+
+    Where every fold was tuned on its own, the tuned values are a range over folds.
+    """
     config = results.config
-    tuned = results.tuning(setup)["tuned"]
+    tuned = [member["tuned"] for member in results.tuning(setup).values()]
     is_published = config.setups[setup].published_as is not None
     lines = []
     for name, published in PUBLISHED_PARAMETERS.items():
         section, _, key = name.partition(".")
         configured = getattr(getattr(config, section), key)
-        line = [name, number(configured), number(tuned.get(name)) if name in tuned else "not tuned"]
+        line = [name, number(configured), _tuned_cell([t[name] for t in tuned if name in t])]
         lines.append([*line, number(published)] if is_published else line)
     heads = ["parameter", "configured", "tuned", *(["published"] if is_published else [])]
-    return Table(f"{setup}: parameters", heads, lines)
+    note = f"Tuned: from {len(tuned)} folds, each with a study of its own." if tuned[1:] else ""
+    return Table(f"{setup}: parameters", heads, lines, note)
+
+
+def _tuned_cell(values: Sequence[float]) -> str:
+    if not values:
+        return "not tuned"
+    low, high = number(min(values)), number(max(values))
+    return low if low == high else f"{low} to {high}"

@@ -90,7 +90,6 @@ def write_artefacts(workspace: Workspace) -> None:
         "best_validation_forecast_mse": 0.4,
     }
     write_json(workspace.train / "training.json", dict.fromkeys(SETUPS, summary))
-    trial = {"number": 0, "state": "complete", "validation_forecast_mse": 0.4}
     limits = {
         "thresholds": {"reconstruction": 0.1, "variance": 0.01},
         "sigma": {"odisar": 0.1},
@@ -100,9 +99,23 @@ def write_artefacts(workspace: Workspace) -> None:
         "calibration_hours": 8.0,
     }
     for setup in SETUPS:
-        write_json(workspace.tuned(setup), {"trials": [trial], "tuned": {"twin.layers": 2}})
+        write_json(workspace.tuned(setup), {"members": {setup: study(2)}})
         write_json(workspace.thresholds(setup), {"members": {setup: limits}})
         write_assessments(workspace, setup)
+
+
+def study(layers: int) -> dict[str, object]:
+    """Return a member's tuning: a complete trial, a better one, and a pruned one."""
+    trials = [
+        {"number": number, "state": state, "validation_forecast_mse": error}
+        for number, state, error in ((0, "complete", 0.4), (1, "complete", 0.3), (2, "pruned", 0.5))
+    ]
+    return {
+        "configured": trials[0],
+        "tuned": {"twin.layers": layers},
+        "best_validation_forecast_mse": 0.3,
+        "trials": trials,
+    }
 
 
 def write_assessments(workspace: Workspace, setup: str) -> None:
@@ -193,6 +206,25 @@ def write_examples(workspace: Workspace) -> None:
         for setup in SETUPS
         for state in STATES
     ).to_parquet(folder / "forecasts.parquet")
+
+
+def add(results: Results, metric: str, detector: str, **columns: object) -> None:
+    """Add a P2 row to the detection table of set-up vessel-all."""
+    row = {"setup": "vessel-all", "protocol": "P2", "metric": metric, "detector": detector}
+    results.detection.loc[len(results.detection)] = pd.Series(row | columns)
+
+
+def without_disturbed(results: Results) -> None:
+    """Leave what is known where no test recording is disturbed."""
+    results.detection = results.detection[results.detection.metric == "false_alarms_per_hour"]
+    results.quadrants = results.quadrants.iloc[:0]
+    results.attribution = results.attribution.iloc[:0]
+    known = results.examples.recordings
+    known["is_disturbed"] = known["is_overall"] = False
+    known["events"] = "[]"
+    known["strength"] = np.nan
+    for kind in results.examples.chosen["vessel"].values():
+        kind["events"] = []
 
 
 def change(results: Results, metric: str, detector: str = "odisar", **columns: float) -> None:

@@ -1,10 +1,14 @@
 import numpy as np
 import pytest
 
+from odisar.artifacts import write_json
 from odisar.report.figures.baselines import baselines_by_strength
+from odisar.report.figures.learning import tuning_trials
 from odisar.report.figures.quadrants import quadrant_distribution
 from odisar.report.gallery import PLATES, draw_figures
 from odisar.report.style import QUADRANTS, detector_colour, save_figure
+
+from .invented import study, without_disturbed
 
 
 def test_every_figure_that_applies_is_drawn_and_old_ones_go(results, tmp_path):
@@ -41,6 +45,30 @@ def test_bars_of_quadrants_are_stacked_to_all_windows(results):
     assert len(ends) == len(QUADRANTS)
     assert max(ends) == pytest.approx(100)
     assert np.all(np.diff(ends) >= 0)
+
+
+def test_every_figure_is_drawn_without_disturbed_recordings(results, tmp_path):
+    without_disturbed(results)
+    names = {item.path.stem for item in draw_figures(results, tmp_path / "figures")}
+    assert "operating-point-vessel-all" in names
+    assert "quadrants-vessel-all" not in names
+
+
+def test_the_trials_of_every_fold_are_drawn_and_each_choice_is_ringed(results, workspace):
+    folds = {f"vessel-all.fold-{n}": study(2 + n) for n in range(3)}
+    write_json(workspace.tuned("vessel-all"), {"members": folds})
+    complete, pruned, chosen = tuning_trials(results).axes[0].collections
+    assert [len(part.get_offsets()) for part in (complete, pruned, chosen)] == [6, 3, 3]
+    places = [x for part in (complete, pruned) for x in part.get_offsets()[:, 0]]
+    assert len(set(places)) == len(places)
+    assert all(x in places for x in chosen.get_offsets()[:, 0])
+    assert {float(y) for y in chosen.get_offsets()[:, 1]} == {0.3}
+
+
+def test_lead_times_of_a_narrowed_set_up_say_what_they_are_measured_against(results, tmp_path):
+    drawn = draw_figures(results, tmp_path / "figures")
+    noted = {item.path.stem for item in drawn if "maneuver random only" in item.caption}
+    assert noted == {"operating-point-vessel-random"}
 
 
 def test_colours_of_detectors_differ_and_do_not_depend_on_the_oracle():

@@ -9,6 +9,8 @@ from odisar.report.page import RunFacts, page_content, render_body, render_page
 from odisar.report.style import save_figure
 from odisar.stages import report as report_stage
 
+from .invented import without_disturbed
+
 FACTS = RunFacts("abc123", "f00", "beef", "odisar", "2026-01-01", [("train", "from cache")])
 
 
@@ -56,6 +58,11 @@ def test_the_page_holds_figures_facts_and_parameters(page):
 def test_the_body_is_the_same_twice(results, figures, tmp_path):
     assert render_body(results, figures, [], None) == render_body(results, figures, [], None)
     assert str(tmp_path) not in render_body(results, figures, [], None)
+
+
+def test_a_body_can_be_made_without_disturbed_recordings(results, figures):
+    without_disturbed(results)
+    assert "Summary" in render_body(results, figures, [], None)
 
 
 def test_stage_and_notebooks_may_read_the_same_parameters():

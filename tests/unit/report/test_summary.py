@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
+from odisar.artifacts import read_json, write_json
 from odisar.report.failings import failings
 from odisar.report.load import Results
 from odisar.report.summary import summarise
 
-from .invented import change
+from .invented import add, change
 
 
 def said(results: Results) -> str:
@@ -50,6 +51,56 @@ def test_values_below_the_published_ones_are_listed(results):
 def test_the_promised_rate_is_judged_with_its_interval(results, value, low, high, words):
     change(results, "false_alarms_per_hour", value=value, ci_low=low, ci_high=high)
     assert words in said(results)
+
+
+def scored(results: Results, name: str, detector: str, value: float) -> None:
+    low, high = value - 0.05, value + 0.05
+    spread = {"value": value, "ci_low": low, "ci_high": high, "strength": 0.5}
+    add(results, "auroc", detector, evaluated_on=name, **spread)
+
+
+def test_scenarios_and_components_that_are_not_seen_are_named_with_value_and_strength(results):
+    scored(results, "current", "odisar", 0.95)
+    scored(results, "novel", "odisar", np.nan)
+    scored(results, "waves", "odisar", 0.59)
+    scored(results, "wind", "odisar", 0.48)
+    scored(results, "wind", "rmse", 0.75)
+    text = said(results)
+    assert "waves at strength 0.5: 59.0 % (54.0 to 64.0); wind at strength 0.5: 48.0 %" in text
+    assert "48.0 % (43.0 to 53.0), forecast RMSE clearly better with 75.0 %." in text
+    assert "Forecast errors are not clearly better for the others." in text
+    assert "current" not in text
+    assert "novel" not in text
+
+
+def test_an_unseen_scenario_tells_that_forecast_errors_see_it_no_better(results):
+    scored(results, "wind", "odisar", 0.48)
+    scored(results, "wind", "rmse", 0.52)
+    assert "Forecast errors are not clearly better there." in said(results)
+
+
+def test_manoeuvres_that_break_the_promise_are_named(results):
+    for name, value, low in (("zigzag", 12.0, 8.0), ("random", 1.5, 0.2), ("turning", 0.0, 0.0)):
+        spread = {"value": value, "ci_low": low, "ci_high": 18.0}
+        add(results, "false_alarms_per_hour", "odisar", evaluated_on=name, **spread)
+    text = said(results)
+    assert "zigzag 12.00 per hour (8.00 to 18.00), random 1.50 per hour" in text
+    assert "(0.20 to 18.00, which includes the promise)" in text
+    assert "turning" not in text
+
+
+def test_late_alarms_of_a_narrowed_set_up_say_what_they_are_measured_against(results):
+    results.detection.loc[results.detection.metric == "lead_time_p50_s", "value"] = -7.0
+    assert "maneuver random only" in " ".join(failings(results, "vessel-random"))
+    assert "only)" not in said(results)
+
+
+def test_pooled_alarm_thresholds_are_told(results, workspace):
+    assert "pools the scores" not in " ".join(summarise(results).certainty)
+    limits = read_json(workspace.thresholds("vessel-all"))
+    limits["members"]["vessel-all"]["operating_pooled"] = 1
+    write_json(workspace.thresholds("vessel-all"), limits)
+    assert "a fold (vessel-all) pools the scores" in " ".join(summarise(results).certainty)
 
 
 def test_missed_events_and_late_alarms_are_told(results):

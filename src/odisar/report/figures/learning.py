@@ -8,6 +8,8 @@ from matplotlib.ticker import MaxNLocator
 from odisar.report.load import Results
 from odisar.report.style import figure_style
 
+#: Share of the room between two trial numbers over which folds are spread.
+_FOLDS_WIDTH = 0.7
 _TRAIN, _VALIDATION, _RECONSTRUCTION = "#56B4E9", "#0072B2", "#009E73"
 
 
@@ -61,15 +63,14 @@ def tuning_trials(results: Results) -> Figure:
 
 
 def _trials(axes: Axes, results: Results, setup: str) -> None:
-    trials = pd.DataFrame(results.tuning(setup)["trials"])
-    trials = trials[trials.validation_forecast_mse.notna()]
+    trials = _all_trials(results, setup)
     complete = trials[trials.state == "complete"]
     pruned = trials[trials.state != "complete"]
     axes.scatter(
-        complete.number, complete.validation_forecast_mse, color=_VALIDATION, s=24, label="complete"
+        complete.place, complete.validation_forecast_mse, color=_VALIDATION, s=24, label="complete"
     )
     axes.scatter(
-        pruned.number,
+        pruned.place,
         pruned.validation_forecast_mse,
         facecolor="none",
         edgecolor="#777777",
@@ -77,9 +78,9 @@ def _trials(axes: Axes, results: Results, setup: str) -> None:
         label="pruned",
     )
     if not complete.empty:
-        best = complete.nsmallest(1, "validation_forecast_mse")
+        best = complete.loc[complete.groupby("member").validation_forecast_mse.idxmin()]
         axes.scatter(
-            best.number,
+            best.place,
             best.validation_forecast_mse,
             s=110,
             facecolor="none",
@@ -89,3 +90,18 @@ def _trials(axes: Axes, results: Results, setup: str) -> None:
         )
     axes.set_title(setup)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _all_trials(results: Results, setup: str) -> pd.DataFrame:
+    """Return every member's trials that have an error; ``place`` sets the members side by side."""
+    studies = results.tuning(setup)
+    step = _FOLDS_WIDTH / len(studies)
+    trials = pd.concat(
+        [
+            pd.DataFrame(study["trials"]).assign(member=name, nth=nth)
+            for nth, (name, study) in enumerate(studies.items())
+        ],
+        ignore_index=True,
+    )
+    trials["place"] = trials.number + step * (trials.nth - (len(studies) - 1) / 2)
+    return trials[trials.validation_forecast_mse.notna()]

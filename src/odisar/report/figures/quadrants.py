@@ -48,6 +48,11 @@ def quadrant_distribution(results: Results, setup: str) -> Figure:
     return figure
 
 
+def has_quadrants(results: Results, setup: str) -> bool:
+    """Whether any window of a disturbed recording was assessed."""
+    return bool((results.quadrants.setup == setup).any())
+
+
 def _bars(axes: Axes, table: pd.DataFrame, scenarios: Sequence[str]) -> None:
     shares = table.pivot_table(index="evaluated_on", columns="quadrant", values="share")
     shares = shares.reindex(index=list(scenarios), columns=list(QUADRANTS))

@@ -29,7 +29,9 @@ def recordings_overview(results: Results, case: str) -> Figure:
                 shade_events(axes, example["events"])
                 if column == 0:
                     axes.set_ylabel(f"{channel.name.replace(' ', chr(10), 1)}\n[{channel.unit}]")
-            grid[0][column].set_title(f"{kind_name(kind)}\n{example['recording']}")
+            grid[0][column].set_title(
+                f"{kind_name(kind if example['events'] else 'clean')}\n{example['recording']}"
+            )
             grid[-1][column].set_xlabel("time [min]")
         figure.align_ylabels()
     return figure
