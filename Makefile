@@ -14,6 +14,8 @@ INSTALLED := $(VENV)/.installed
 ODISAR := $(BIN)/python -m odisar
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PYTHONPATH := $(CURDIR)/src
+# Ours and DVC's lines in the order they happen, in a log as well.
+export PYTHONUNBUFFERED := 1
 unexport VIRTUAL_ENV
 
 .DEFAULT_GOAL := help

@@ -11,8 +11,8 @@ import torch
 import torch.nn.functional as F
 
 from odisar.config.learning import TwinConfig
+from odisar.twin.devices import use_one_thread
 from odisar.twin.mc_dropout import draw_forecasts, draw_masks
-from odisar.twin.training import use_one_thread
 from odisar.twin.transformer import TwinTransformer
 from odisar.windows.windowing import WindowSpec
 

@@ -3,8 +3,9 @@
 import pytest
 
 from odisar.twin.bundle import TrainedTwin
+from odisar.twin.devices import use_one_thread
 from odisar.twin.mc_dropout import draw_masks
-from odisar.twin.training import TrainingPlan, train_twin, use_one_thread
+from odisar.twin.training import TrainingPlan, train_twin
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSet
 from small_system import CHANNELS, SPEC, make_recording, small_plan

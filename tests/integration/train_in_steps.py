@@ -9,6 +9,7 @@ import lightning as L
 from safetensors.torch import save_file
 
 from odisar.twin import training
+from odisar.twin.devices import use_one_thread
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSet
 from small_system import SPEC, make_recording, small_plan
@@ -22,7 +23,7 @@ class Slowly(L.Callback):
 
 
 def main(checkpoints: Path) -> None:
-    training.use_one_thread()
+    use_one_thread()
     plan = dataclasses.replace(
         small_plan(), training=small_plan().training.model_copy(update={"epochs": 4})
     )

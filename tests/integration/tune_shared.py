@@ -3,7 +3,7 @@
 import sys
 
 from odisar.config.learning import LearningRateRange, TuningConfig
-from odisar.twin.training import use_one_thread
+from odisar.twin.devices import use_one_thread
 from odisar.twin.tuning import tune_twin
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSet

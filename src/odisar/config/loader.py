@@ -102,6 +102,12 @@ class Config(Section):
         """Names of the cases that this pipeline's set-ups need, in order, once each."""
         return list(dict.fromkeys(self.setups[name].case for name in self.pipeline.setups))
 
+    @property
+    def simulates_the_ferry(self) -> bool:
+        """Whether an active case's recordings come from the ferry simulator."""
+        makers = [self.cases[name].source.maker for name in self.active_cases]
+        return "ferry-simulator" in makers
+
 
 class ConfigView:
     """The sections a stage has declared, and no other: an undeclared read fails loudly.
@@ -118,7 +124,7 @@ class ConfigView:
         """Return a declared section."""
         if name.startswith("_"):  # asked for while a copy for another process is being built
             raise AttributeError(name)
-        if name in ("case_of", "active_cases"):
+        if name in ("case_of", "active_cases", "simulates_the_ferry"):
             return getattr(self._config, name)
         if name not in self.sections:
             raise AttributeError(

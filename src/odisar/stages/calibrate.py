@@ -19,7 +19,7 @@ from odisar.stages.members import Member, MemberData, hours, load_member, pipeli
 from odisar.stages.parallel import run_jobs, show_progress
 from odisar.tracking import TrackedRun
 from odisar.twin.bundle import read_twin
-from odisar.twin.training import pick_device, use_one_thread
+from odisar.twin.devices import pick_device, use_one_thread
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "evaluation")
 

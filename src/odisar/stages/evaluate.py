@@ -29,7 +29,7 @@ from odisar.stages.members import Member, load_member, pipeline_members
 from odisar.stages.parallel import run_jobs, show_progress
 from odisar.tracking import TrackedRun
 from odisar.twin.bundle import read_twin
-from odisar.twin.training import pick_device, use_one_thread
+from odisar.twin.devices import pick_device, use_one_thread
 from odisar.windows.nearness import nearness_table
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "evaluation")

@@ -14,7 +14,6 @@ from odisar.errors import OdisarError
 from odisar.report.load import report_folder
 from odisar.report.page import RunFacts, page_content, render_page
 from odisar.report.simulator_checks import show_sea_trial
-from odisar.stages.report import uses_ferry_simulator
 from odisar.stages.runner import STAGES, plain, run_stage
 from odisar.tracking import (
     FINISHED,
@@ -68,7 +67,7 @@ def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> 
     facts = run_facts(config, workspace, tracker)
     body = path.read_text(encoding="utf-8")
     trial = None
-    if uses_ferry_simulator(config):
+    if config.simulates_the_ferry:
         picture = workspace.root / "build/sea-trial.png"
         trial = show_sea_trial(config.sources.gunnerus.file, workspace.root, picture)
     page = render_page(config.report.title, body, facts, flatten(configured(config)), trial)

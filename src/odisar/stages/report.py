@@ -54,7 +54,7 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
         executing = pool.submit(execute_notebooks, workspace.root, folder / "notebooks")
         figures = draw_figures(results, workspace.figures)
         plausible = None
-        if uses_ferry_simulator(config):
+        if config.simulates_the_ferry:
             figures.append(_draw_trials(config, workspace))
             plausible = plausibility(
                 plausibility_table(config.simulators.vessel, config.simulators.seed)
@@ -112,8 +112,3 @@ def _draw_trials(config: ConfigView, workspace: Workspace) -> Drawn:
     save_figure(standard_trials(trial_traces(config.simulators.vessel)), path)
     caption = "The simulated ferry in calm water: turning circles and zigzags at four angles."
     return Drawn("simulator", "", caption, path)
-
-
-def uses_ferry_simulator(config: ConfigView) -> bool:
-    """Whether a case of the pipeline is simulated."""
-    return any(config.cases[name].source.maker == "ferry-simulator" for name in config.active_cases)

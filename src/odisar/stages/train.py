@@ -13,8 +13,9 @@ from odisar.stages.parallel import run_jobs
 from odisar.stages.tune import training_plan
 from odisar.tracking import TrackedRun, content_key
 from odisar.twin.bundle import TrainedTwin, write_twin
+from odisar.twin.devices import use_one_thread
 from odisar.twin.mc_dropout import draw_masks
-from odisar.twin.training import TrainingResult, train_twin, use_one_thread
+from odisar.twin.training import TrainingResult, train_twin
 from odisar.twin.tuning import tuned_plan
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "training", "capability")

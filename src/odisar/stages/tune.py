@@ -15,7 +15,8 @@ from odisar.seeding import derive_seed
 from odisar.stages.members import Member, MemberData, load_member, pipeline_members
 from odisar.stages.parallel import run_jobs
 from odisar.tracking import TrackedRun, content_key
-from odisar.twin.training import TrainingPlan, use_one_thread
+from odisar.twin.devices import use_one_thread
+from odisar.twin.training import TrainingPlan
 from odisar.twin.tuning import TuningResult, tune_twin
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "training", "tuning")

@@ -1,7 +1,5 @@
 """Train a twin: resumable, repeatable, stopped by the validation forecast error."""
 
-import logging
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +9,9 @@ import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 
 from odisar.config.learning import TrainingConfig, TwinConfig
-from odisar.errors import OdisarError
 from odisar.seeding import derive_seed
 from odisar.twin.checkpoints import SafetensorsCheckpointIO, read_checkpoint
+from odisar.twin.devices import pick_device
 from odisar.twin.lightning_module import VALIDATION_METRIC, TwinModule
 from odisar.twin.progress import EpochHistory
 from odisar.twin.transformer import TwinTransformer
@@ -46,29 +44,6 @@ class TrainingResult:
     history: list[dict[str, float]]
     best_validation_mse: float
     windows_seen: int
-
-
-def use_one_thread() -> None:
-    """Make torch repeatable and keep it to one thread: processes, not threads, fill the cores."""
-    torch.set_num_threads(1)
-    torch.use_deterministic_algorithms(mode=True, warn_only=True)
-    logging.getLogger("lightning.pytorch").setLevel(logging.ERROR)
-    warnings.filterwarnings("ignore", message=".*does not have many workers.*")
-    warnings.filterwarnings("ignore", message=".*Checkpoint directory.*exists and is not empty.*")
-    warnings.filterwarnings("ignore", message=".*isinstance.treespec, LeafSpec.*")
-
-
-def pick_device(accelerator: str) -> str:
-    """Return ``cuda`` or ``cpu`` as ``pipeline.accelerator`` asks for.
-
-    Raises OdisarError where a GPU is asked for and there is none.
-    """
-    if accelerator == "gpu" and not torch.cuda.is_available():
-        raise OdisarError(
-            "pipeline.accelerator=gpu, but torch finds no CUDA GPU; say auto or cpu, or install a "
-            "GPU build of torch (see the README)"
-        )
-    return "cuda" if accelerator != "cpu" and torch.cuda.is_available() else "cpu"
 
 
 def build_module(plan: TrainingPlan, windows: WindowSet) -> TwinModule:
