@@ -47,9 +47,7 @@ def track_recordings(root: Path, *, accept: bool) -> None:
     if not (root / "data.dvc").exists():
         run_dvc(root, "add", "data", "--quiet")
         return
-    status = json.loads(run_dvc(root, "status", "data.dvc", "--json") or "{}")
-    if not _differs(status):
-        run_dvc(root, "commit", "data.dvc", "--quiet")
+    if _is_accepted(root):
         return
     config = load_config(root)
     raise_on_errors(_findings(config, root))
@@ -75,7 +73,7 @@ def run_dvc(root: Path, *arguments: str) -> str:
         check=False,
     )
     if done.returncode:
-        words = (done.stderr or done.stdout).strip()
+        words = (done.stderr or done.stdout).strip() or "it gave no reason"
         raise OdisarError(f"dvc {' '.join(arguments)} failed: {words}")
     return done.stdout.strip()
 
@@ -113,8 +111,19 @@ def _has_recordings(folder: Path) -> bool:
     return folder.is_dir() and any(folder.iterdir())
 
 
-def _differs(status: dict[str, object]) -> bool:
-    return "modified" in json.dumps(status) or "deleted" in json.dumps(status)
+def _is_accepted(root: Path) -> bool:
+    """Bring the recordings into DVC's cache and return True, if they are those of ``data.dvc``.
+
+    Without a cache, as in a fresh clone, DVC's status can't tell whether recordings differ; its
+    commit can, and refuses those that do.
+    """
+    if json.loads(run_dvc(root, "status", "data.dvc", "--json") or "{}") == {}:
+        return True
+    try:
+        run_dvc(root, "commit", "data.dvc", "--quiet")
+    except OdisarError:
+        return False
+    return True
 
 
 def _findings(config: Config, root: Path) -> list[Finding]:

@@ -60,6 +60,8 @@ def print_results(root: Path) -> None:
         "figures": workspace.figures,
     }
     for name, path in places.items():
+        if not path.exists():
+            continue
         print(f"{name:>8}: {_shown(path)}")  # noqa: T201
     print(f"{'runs':>8}: make ui    (MLflow, http://127.0.0.1:5000)")  # noqa: T201
 

@@ -159,6 +159,11 @@ class Case(Section):
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise ValueError(f"channels: {', '.join(repeated)} declared more than once")
+        if self.max_gap_s * self.rate_hz < 1:
+            raise ValueError(
+                f"max_gap_s={self.max_gap_s} is shorter than a sampling period of "
+                f"{1 / self.rate_hz:g} s: every step would be a gap"
+            )
         short_lead_steps = round(self.short_lead_s * self.rate_hz)
         if not 1 <= short_lead_steps <= self.window.horizon_steps:
             raise ValueError(

@@ -1,6 +1,6 @@
 """Sections for the capability and for the evaluation."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field
 
@@ -11,10 +11,8 @@ _GUARDS = ("guard_start_s", "guard_end_s")
 
 
 class CapabilityConfig(Section):
-    """Monte Carlo dropout, thresholds and attribution (paper, section "Creating DTC")."""
+    """Thresholds and attribution (paper, section "Creating DTC")."""
 
-    draws: Annotated[int, Field(ge=2)]
-    dropout_scope: Literal["all", "decoder"]
     threshold_sigmas: PositiveFloat
     attribution_top: PositiveInt
     scoring_batch: PositiveInt

@@ -1,12 +1,13 @@
 """Sections for the twin, its training and its tuning."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from odisar.config.base import Section
 from odisar.config.cases import PositiveFloat, PositiveInt
 
+Choices = Annotated[list[PositiveInt], Field(min_length=1)]
 DropoutRate = Annotated[float, Field(ge=0, lt=1)]
 
 
@@ -29,6 +30,13 @@ class TwinConfig(Section):
                 f"twin.model_dim={self.model_dim} must be a multiple of twin.heads={self.heads}"
             )
         return self
+
+
+class MonteCarloConfig(Section):
+    """The dropout masks that are drawn once and stored with a twin."""
+
+    draws: Annotated[int, Field(ge=2)]
+    dropout_scope: Literal["all", "decoder"]
 
 
 class TrainingConfig(Section):
@@ -61,10 +69,10 @@ class TuningConfig(Section):
     reports_per_trial: PositiveInt
     pruner_warmup_trials: PositiveInt
     learning_rate: LearningRateRange
-    model_dim: list[PositiveInt]
-    layers: list[PositiveInt]
-    feedforward_dim: list[PositiveInt]
-    storage: str
+    model_dim: Choices
+    layers: Choices
+    feedforward_dim: Choices
+    storage: Annotated[str, Field(pattern=r"^journal$|^[a-z0-9+]+://")]
 
     @model_validator(mode="after")
     def _check(self) -> Self:

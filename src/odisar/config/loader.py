@@ -10,7 +10,7 @@ from ruamel.yaml.error import YAMLError
 from odisar.config.base import Section
 from odisar.config.cases import Case, PositiveInt, Setup
 from odisar.config.judging import CapabilityConfig, EvaluationConfig
-from odisar.config.learning import TrainingConfig, TuningConfig, TwinConfig
+from odisar.config.learning import MonteCarloConfig, TrainingConfig, TuningConfig, TwinConfig
 from odisar.config.simulators import SimulatorsConfig
 from odisar.config.sources import SourcesConfig
 from odisar.errors import OdisarError
@@ -32,7 +32,7 @@ class PipelineConfig(Section):
 class TrackingConfig(Section):
     """Where runs are logged: the MLflow experiment."""
 
-    experiment: str
+    experiment: Annotated[str, Field(min_length=1)]
 
 
 class ReportConfig(Section):
@@ -50,6 +50,7 @@ class Config(Section):
     setups: dict[Name, Setup]
     cases: dict[Name, Case]
     twin: TwinConfig
+    monte_carlo: MonteCarloConfig
     training: TrainingConfig
     tuning: TuningConfig
     capability: CapabilityConfig
@@ -62,6 +63,8 @@ class Config(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if len(set(self.pipeline.setups)) < len(self.pipeline.setups):
+            raise ValueError("pipeline.setups: a set-up is named twice")
         for name in self.pipeline.setups:
             if name not in self.setups:
                 raise ValueError(
@@ -74,6 +77,21 @@ class Config(Section):
                     f"setups.{name}.case: {setup.case!r} is not declared under cases; declared "
                     f"are: {', '.join(self.cases)}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _check_search(self) -> Self:
+        for name in ("model_dim", "layers", "feedforward_dim"):
+            value, choices = getattr(self.twin, name), getattr(self.tuning, name)
+            if value not in choices:
+                raise ValueError(
+                    f"tuning.{name}={choices} must hold twin.{name}={value}, which trial 0 takes"
+                )
+        rates, rate = self.tuning.learning_rate, self.training.learning_rate
+        if not rates.low <= rate <= rates.high:
+            raise ValueError(
+                f"tuning.learning_rate must span training.learning_rate={rate}, which trial 0 takes"
+            )
         return self
 
     @model_validator(mode="after")

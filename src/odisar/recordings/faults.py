@@ -35,6 +35,10 @@ class _Fault:
         return "-".join(parts)
 
 
+#: Metadata columns that a faulty copy has besides those of its original.
+FAULT_COLUMNS = ("fault_channel", "fault_size", "fault_shows")
+
+
 def inject_faults(
     recordings: Sequence[Recording],
     case: Case,

@@ -157,6 +157,14 @@ def describe(
     if index is None:
         if not intervals:
             return labelled
+        others = sorted({interval.label for interval in intervals[1:]} - {intervals[0].label})
+        if others:
+            notes.warning(
+                f"the recording counts as {intervals[0].label!r}, its first label, as a whole",
+                "cut it into recordings with one kind of disturbance each, or accept it",
+                column="label",
+                value=", ".join(others),
+            )
         info = replace(recording.info, disturbance=intervals[0].label, components="all")
         return replace(labelled, info=info)
     info = index.infos.get(recording.name, recording.info)

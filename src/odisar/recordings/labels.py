@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from odisar.recordings.quality import Notes
-from odisar.recordings.schema import LABEL_COLUMNS, Interval
+from odisar.recordings.schema import LABEL_COLUMNS, UNDISTURBED, Interval
 from odisar.recordings.text_table import TextRow, read_text_table
 
 
@@ -53,6 +53,14 @@ def _interval(row: TextRow, notes: Notes) -> Interval | None:
     label = row.get("label")
     if not label:
         notes.error("the label is missing", "name the disturbance", column="label", row=row.line)
+    if label == UNDISTURBED:
+        notes.error(
+            f"the label {UNDISTURBED!r} means undisturbed",
+            "name the disturbance, or remove the line",
+            column="label",
+            row=row.line,
+            value=label,
+        )
     if start_s is None or end_s is None or not label:
         return None
     if end_s <= start_s:

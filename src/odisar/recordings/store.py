@@ -71,8 +71,14 @@ def read_store(path: Path) -> list[Recording]:
     for name in (SAMPLES_FILE, METADATA_FILE):
         if not (path / name).is_file():
             raise OdisarError(f"{path / name} is missing: run the preprocess stage (dvc repro)")
-    metadata = json.loads((path / METADATA_FILE).read_text(encoding="utf-8"))
-    table = parquet.read_table(path / SAMPLES_FILE, use_threads=False)
+    try:
+        metadata = json.loads((path / METADATA_FILE).read_text(encoding="utf-8"))
+        table = parquet.read_table(path / SAMPLES_FILE, use_threads=False)
+    except (OSError, ValueError) as error:  # pyarrow's errors are ValueErrors too
+        raise OdisarError(
+            f"{path}: damaged ({' '.join(str(error).split())}); run the preprocess stage again "
+            "(dvc repro --force preprocess)"
+        ) from error
     time_s = table.column("time_s").to_numpy()
     values = np.empty((len(time_s), table.num_columns - 2))
     for i in range(values.shape[1]):

@@ -37,7 +37,16 @@ FORECAST_COLUMNS = (
 )
 
 _BATCH = 64
-_DETAILS = ("case", "maneuver", "variant", "disturbance", "components", "base_seed")
+_DETAILS = (
+    "case",
+    "maneuver",
+    "variant",
+    "disturbance",
+    "components",
+    "base_seed",
+    "fault_channel",
+    "fault_size",
+)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ SECTIONS = (
     "setups",
     "cases",
     "twin",
+    "monte_carlo",
     "training",
     "tuning",
     "capability",

@@ -1,10 +1,14 @@
 """Read and check every recording of the active cases; store the good ones; show the splits."""
 
+from collections.abc import Sequence
+
 import pandas as pd
 
 from odisar.artifacts import Workspace, write_table
+from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
 from odisar.errors import OdisarError
+from odisar.recordings.faults import FAULT_COLUMNS
 from odisar.recordings.quality import (
     Finding,
     quality_table,
@@ -14,7 +18,7 @@ from odisar.recordings.quality import (
 )
 from odisar.recordings.reader import read_case
 from odisar.recordings.recipe import check_recipe
-from odisar.recordings.schema import Recording
+from odisar.recordings.schema import INDEX_COLUMNS, Recording
 from odisar.recordings.store import write_store
 from odisar.stages.members import hours, load_member, pipeline_members
 from odisar.tracking import TrackedRun
@@ -40,6 +44,8 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
         write_store(workspace.recordings(name), group, config.cases[name].channel_names)
     write_quality_table(workspace.preprocess / "quality.csv", quality)
     write_findings(workspace.preprocess / "findings.json", findings)
+    for name, group in recordings.items():
+        require_columns(config.cases[name], group)
     splits = split_overview(config, workspace)
     require_disturbed(splits)
     write_table(workspace.preprocess / "splits.csv", splits)
@@ -62,6 +68,7 @@ def split_overview(config: ConfigView, workspace: Workspace) -> pd.DataFrame:
                     "split": split,
                     "recordings": len(group),
                     "disturbed": sum(recording.info.is_disturbed for recording in group),
+                    "overall": sum(_counts_overall(recording, data.case) for recording in group),
                     "hours": hours(group, data.case),
                     "windows": len(data.windows(split)) if group else 0,
                 }
@@ -69,13 +76,37 @@ def split_overview(config: ConfigView, workspace: Workspace) -> pd.DataFrame:
     return pd.DataFrame(rows).astype({"fold": "Int64"})
 
 
+def _counts_overall(recording: Recording, case: Case) -> bool:
+    return recording.info.is_disturbed and all(
+        recording.info.column(column) in allowed for column, allowed in case.groups.overall.items()
+    )
+
+
+def require_columns(case: Case, recordings: Sequence[Recording]) -> None:
+    """Raise OdisarError where ``groups`` names a metadata column that no recording has."""
+    known = set(INDEX_COLUMNS) | {column for item in recordings for column in item.info.extra}
+    known |= set(FAULT_COLUMNS) if case.faults else set()
+    groups = case.groups
+    for column in [*groups.overall, *groups.group_by, *groups.apart]:
+        if column not in known:
+            raise OdisarError(
+                f"case {case.title!r}: groups names the metadata column {column!r}, which no "
+                f"recording has; known are {', '.join(sorted(known))}"
+            )
+
+
 def require_disturbed(splits: pd.DataFrame) -> None:
     """Raise OdisarError for a set-up that nothing disturbed would test."""
-    test = splits[splits.split == "test"].groupby("setup").disturbed.sum()
-    for setup in test.index[test == 0]:
+    test = splits[splits.split == "test"].groupby("setup")[["disturbed", "overall"]].sum()
+    for setup in test.index[test.disturbed == 0]:
         raise OdisarError(
             f"set-up {setup!r}: no test recording holds a disturbance, so no detector could be "
             "judged; label disturbed intervals in labels.csv, or declare `faults` for the case"
+        )
+    for setup in test.index[test.overall == 0]:
+        raise OdisarError(
+            f"set-up {setup!r}: no disturbed test recording is selected by the case's "
+            "groups.overall; widen it, or leave it empty to take them all"
         )
 
 

@@ -32,6 +32,7 @@ PARAMS = (
     "setups",
     "cases",
     "twin",
+    "monte_carlo",
     "training",
     "tuning",
     "capability",

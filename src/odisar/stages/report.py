@@ -35,6 +35,7 @@ PARAMS = (
     "setups",
     "cases",
     "twin",
+    "monte_carlo",
     "training",
     "tuning",
     "capability",

@@ -18,7 +18,7 @@ from odisar.twin.mc_dropout import draw_masks
 from odisar.twin.training import TrainingResult, train_twin
 from odisar.twin.tuning import tuned_plan
 
-PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "training", "capability")
+PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "monte_carlo", "training")
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def _train(job: _Job) -> dict[str, Any]:
     )
     masks = draw_masks(
         result.network,
-        config.capability.draws,
-        config.capability.dropout_scope,
+        config.monte_carlo.draws,
+        config.monte_carlo.dropout_scope,
         derive_seed(config.seed, "masks", member.name),
     )
     twin = TrainedTwin(
