@@ -78,13 +78,13 @@ PLATES = (
         "baselines-by-strength",
         "detection",
         "Detection by strength of the disturbance under P2 (the score at t against 'disturbed at "
-        "t'). Hollow diamonds: published at full strength, with other data and another protocol.",
+        "t'). Hollow diamonds, if any: published, with other data and another protocol.",
         baselines_by_strength,
     ),
     Plate(
         "baselines-by-scenario",
         "detection",
-        "Detection by scenario under P2, at the greatest strength.",
+        "Detection by scenario under P2, at the greatest strength if there are several.",
         baselines_by_scenario,
         applies=has_groups,
     ),
@@ -92,8 +92,8 @@ PLATES = (
         "apart",
         "detection",
         "What is left out of the overall rows and judged apart, beside the overall at the same "
-        "strength (P2). Recordings disturbed from end to end hold no undisturbed time to rank "
-        "against, so they have no AUROC.",
+        "strength (P2). Groups that are disturbed from end to end are ranked against the "
+        "undisturbed test recordings.",
         components_apart,
         applies=has_components,
     ),
@@ -115,7 +115,7 @@ PLATES = (
     Plate(
         "protocols",
         "protocols",
-        "The same scores under four protocols, at the greatest strength. The oracle knows whether "
+        "The same scores under four protocols, at the greatest strength if there are several. The oracle knows whether "
         "a disturbance is active now and nothing of the future; under P1 it cannot be perfect.",
         protocols,
     ),
@@ -153,7 +153,7 @@ PLATES = (
     Plate(
         "attribution",
         "events",
-        "Which states the flagged windows blame, at the greatest strength.",
+        "Which states the flagged windows blame, at the greatest strength if there are several.",
         attribution_shares,
         applies=has_flagged,
     ),
