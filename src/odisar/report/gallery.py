@@ -115,7 +115,8 @@ PLATES = (
     Plate(
         "protocols",
         "protocols",
-        "The same scores under four protocols, at the greatest strength if there are several. The oracle knows whether "
+        "The same scores under four protocols, at the greatest strength if there are several. The "
+        "oracle knows whether "
         "a disturbance is active now and nothing of the future; under P1 it cannot be perfect.",
         protocols,
     ),
