@@ -61,7 +61,7 @@ ui: $(INSTALLED)  ## Browse runs in MLflow on http://127.0.0.1:5000
 		--backend-store-uri "sqlite:///$(CURDIR)/mlflow.db" --artifacts-destination "$(CURDIR)/mlartifacts"
 
 lab: $(INSTALLED)  ## Open the notebooks in JupyterLab on loopback
-	@$(BIN)/jupyter lab --ip 127.0.0.1 notebooks
+	@$(BIN)/jupyter lab --ip 127.0.0.1 $(if $(filter 0,$(shell id -u)),--allow-root) notebooks
 
 test: $(INSTALLED)  ## Run the whole test suite
 	@$(BIN)/python -m pytest
