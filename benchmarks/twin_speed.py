@@ -86,18 +86,18 @@ def score(twin: TwinTransformer) -> Callable[[], object]:
 def main() -> None:
     """Print milliseconds a window and ratios."""
     use_one_thread()
-    print("ms a window        patch 5   patch 1   ratio")  # noqa: T201
+    print("ms a window        patch 5   patch 1   ratio")
     for name, make, windows in (("train", train_step, BATCH), ("score", score, 256)):
         five, one = (1e3 * seconds(make(network(p)), 5) / windows for p in (5, 1))
-        print(f"{name:<18}{five:8.3f}  {one:8.3f}  {one / five:6.1f}")  # noqa: T201
+        print(f"{name:<18}{five:8.3f}  {one:8.3f}  {one / five:6.1f}")
     twin, inputs = network(5), batch(32)
     times = {}
     for scope in ("all", "decoder"):
         masks = draw_masks(twin, DRAWS, scope, 0)
         times[scope] = 1e3 * seconds(lambda m=masks: draw_forecasts(twin, m, *inputs), 3) / 32
     ratio = times["all"] / times["decoder"]
-    print(f"\n{DRAWS} dropout draws, ms a window: all {times['all']:.2f}, ", end="")  # noqa: T201
-    print(f"decoder only {times['decoder']:.2f}, ratio {ratio:.1f}")  # noqa: T201
+    print(f"\n{DRAWS} dropout draws, ms a window: all {times['all']:.2f}, ", end="")
+    print(f"decoder only {times['decoder']:.2f}, ratio {ratio:.1f}")
 
 
 if __name__ == "__main__":

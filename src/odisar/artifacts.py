@@ -46,6 +46,11 @@ class Workspace:
         return self.root / "build/evaluate"
 
     @property
+    def development(self) -> Path:
+        """How well the bundled twins do on development recordings."""
+        return self.root / "build/bundle/development.json"
+
+    @property
     def scratch(self) -> Path:
         """Checkpoints and studies of unfinished stages: what a killed stage goes on from."""
         return self.root / "build/scratch"
@@ -85,6 +90,10 @@ class Workspace:
     def thresholds(self, setup: str) -> Path:
         """Return a set-up's thresholds."""
         return self.calibrate / f"{setup}.json"
+
+    def bundle(self, setup: str) -> Path:
+        """Return a set-up's bundle: what is registered and can be deployed."""
+        return self.root / "build/bundle" / setup
 
     def scores(self, setup: str) -> Path:
         """Return the scores of a set-up's test recordings."""

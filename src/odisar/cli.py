@@ -3,7 +3,7 @@
 import argparse
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from odisar.errors import OdisarError
@@ -15,7 +15,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     root = Path.cwd()
     try:
-        _COMMANDS[options.command](root, options)
+        code = _COMMANDS[options.command](root, options)
     except OdisarError as error:
         if options.debug:
             traceback.print_exc()
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
-    return 0
+    return code or 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -51,6 +51,18 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("init-store", help="create the MLflow database")
     commands.add_parser("report", help="put the one-file report together again")
     commands.add_parser("results", help="print the result table")
+    promote = commands.add_parser("promote", help="make a registered version the champion")
+    promote.add_argument("model")
+    promote.add_argument("version")
+    new_case = commands.add_parser("new-case", help="propose a profile for your own recordings")
+    new_case.add_argument("folder", type=Path, help="holds a file or a bag for each recording")
+    new_case.add_argument("--name", help="of the profile and its case (else that of the folder)")
+    new_case.add_argument("--write", action="store_true", help="put it into params.yaml")
+    inspect = commands.add_parser("inspect", help="check recordings, without running anything")
+    inspect.add_argument("folder", type=Path)
+    declared = inspect.add_mutually_exclusive_group()
+    declared.add_argument("--profile", help="check them as this profile declares them")
+    declared.add_argument("--case", help="check them as this case declares them")
     return parser
 
 
@@ -103,7 +115,39 @@ def _results(root: Path, _options: argparse.Namespace) -> None:
     print_results(root)
 
 
-_COMMANDS = {
+def _promote(root: Path, options: argparse.Namespace) -> None:
+    from odisar.tracking.registry import promote
+
+    print(promote(root, options.model, options.version))
+
+
+def _new_case(root: Path, options: argparse.Namespace) -> None:
+    from odisar.proposals.new_case import propose
+    from odisar.proposals.summary import summary
+    from odisar.proposals.writing import write_profile
+
+    proposal = propose(root, options.folder, options.name, _say, write=options.write)
+    print(f"profiles:\n{proposal.text}", end="", flush=True)
+    if options.write:
+        write_profile(root, proposal.name, proposal.text)
+    _say(f"\n{summary(proposal, options.folder, written=options.write)}")
+
+
+def _inspect(root: Path, options: argparse.Namespace) -> int:
+    from odisar.proposals.choosing import choose_case
+    from odisar.proposals.inspection import inspect_case
+
+    chosen = choose_case(root, options.folder, options.profile, options.case, _say)
+    report = inspect_case(chosen.case, chosen.result, chosen.origin)
+    print(f"{report.text}\n\n{report.counts}")
+    return 1 if report.errors else 0
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+_COMMANDS: dict[str, Callable[[Path, argparse.Namespace], int | None]] = {
     "stage": _stage,
     "data": _data,
     "repro": _repro,
@@ -111,4 +155,7 @@ _COMMANDS = {
     "init-store": _init_store,
     "report": _report,
     "results": _results,
+    "promote": _promote,
+    "new-case": _new_case,
+    "inspect": _inspect,
 }

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from odisar.config.loader import Config, load_config
@@ -10,9 +11,12 @@ from odisar.errors import OdisarError
 from odisar.recordings.quality import Finding, raise_on_errors
 from odisar.recordings.reader import read_case
 from odisar.recordings.recipe import recipe_file
+from odisar.recordings.schema import Recording
 from odisar.recordings.writer import write_recordings
+from odisar.simulators.robot.runs import simulate_robot
 from odisar.simulators.vessel.runs import simulate_vessel
 from odisar.sources.gunnerus import make_gunnerus
+from odisar.sources.omni3 import make_omni3
 
 
 def make_recordings(root: Path) -> None:
@@ -24,18 +28,32 @@ def make_recordings(root: Path) -> None:
     config = load_config(root)
     for name in config.active_cases:
         source = config.cases[name].source
-        folder = root / source.folder
-        if source.maker == "ferry-simulator":
-            _simulate(config, name, folder, recipe_file(root))
+        folder = _tracked_folder(root, name, source.folder)
+        if (wanted := config.recipe_of(name)) is not None:
+            _simulate(config, name, folder, recipe_file(root), wanted)
         elif _has_recordings(folder):
             continue
         elif source.maker == "gunnerus-trial":
             make_gunnerus(config.sources.gunnerus, root, folder)
+        elif source.maker == "omni3-runs":
+            make_omni3(config.sources.omni3, root, folder)
         else:
             raise OdisarError(
                 f"case {name!r}: there are no recordings in {source.folder}; put its CSV files "
                 "there (see the README, 'Your own recordings')"
             )
+
+
+def _tracked_folder(root: Path, case_name: str, folder: str) -> Path:
+    """Return a case's folder; raise OdisarError for one that the pipeline would not track."""
+    path = (root / folder).resolve()
+    if not path.is_relative_to((root / "data").resolve()):
+        raise OdisarError(
+            f"cases.{case_name}.source.folder={folder}: the pipeline tracks recordings below data/ "
+            "alone; declare the case in a profile, whose recordings may lie anywhere (`odisar "
+            "new-case` does), or move the folder"
+        )
+    return path
 
 
 def track_recordings(root: Path, *, accept: bool) -> None:
@@ -78,9 +96,9 @@ def run_dvc(root: Path, *arguments: str) -> str:
     return done.stdout.strip()
 
 
-def _simulate(config: Config, name: str, folder: Path, recipe_path: Path) -> None:
+def _simulate(config: Config, name: str, folder: Path, recipe_path: Path, wanted: str) -> None:
     recipes = json.loads(recipe_path.read_text()) if recipe_path.exists() else {}
-    wanted, found = config.simulators.recipe(), recipes.get(name)
+    found = recipes.get(name)
     if _has_recordings(folder):
         if found == wanted:
             return
@@ -92,8 +110,13 @@ def _simulate(config: Config, name: str, folder: Path, recipe_path: Path) -> Non
             )
     print(f"simulating the recordings of {name} ...")  # noqa: T201
     _remove_listed(folder)
-    recordings = simulate_vessel(config.simulators.vessel, config.simulators.seed)
-    written = write_recordings(folder, recordings, config.cases[name].channel_names)
+    case, simulators = config.cases[name], config.simulators
+    recordings: Iterable[Recording]
+    if case.source.maker == "robot-simulator":
+        recordings = simulate_robot(simulators.robot, simulators.seed, case.channel_names)
+    else:
+        recordings = simulate_vessel(simulators.vessel, simulators.seed)
+    written = write_recordings(folder, recordings, case.channel_names)
     recipe_path.write_text(json.dumps(recipes | {name: wanted}, indent=1) + "\n")
     print(f"  {len(written)} files")  # noqa: T201
 

@@ -1,4 +1,8 @@
-"""Lay a copy of the project out with a profile's parameters, to run the same pipeline there."""
+"""Lay a copy of the project out with a profile's parameters, to run the same pipeline there.
+
+A profile may bring a case of its own, with recordings anywhere on this machine: they are copied
+into the workspace, whose pipeline tracks them; the project's own results stay as they are.
+"""
 
 import shutil
 from collections.abc import Mapping
@@ -8,10 +12,11 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from odisar.config.loader import PARAMS_FILE, load_config, parse_config
+from odisar.config.loader import PARAMS_FILE, Config, load_config, parse_config
 from odisar.errors import OdisarError
 
 _COPIED = ("dvc.yaml", ".dvcignore", "src", "notebooks")
+_OPEN_SECTIONS = ("cases", "setups")
 _LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.egg-info", ".ipynb_checkpoints")
 
 
@@ -34,10 +39,61 @@ def lay_out(root: Path, profile: str) -> Path:
     yaml = YAML()
     yaml.width = 1000
     params = yaml.load((root / PARAMS_FILE).read_text(encoding="utf-8"))
-    merge(params, config.profiles[profile], f"profiles.{profile}")
-    parse_config(YAML(typ="safe", pure=True).load(_dump(yaml, params)), f"profile {profile!r}")
+    merged = merge_profile(params, profile)
+    _bring_recordings(root, target, params, merged)
     (target / PARAMS_FILE).write_text(_dump(yaml, params), encoding="utf-8")
     return target
+
+
+def merge_profile(params: dict[str, Any], profile: str) -> Config:
+    """Put a profile's changes over ``params``, in place, and return what they make, validated."""
+    changes = params["profiles"][profile]
+    for section in _OPEN_SECTIONS:  # a profile may add cases and set-ups of its own
+        added = changes.get(section, {})
+        if not isinstance(added, Mapping):
+            raise OdisarError(f"profiles.{profile}.{section}: expected names with their sections")
+        for name in added:
+            params[section].setdefault(name, added[name])
+    merge(params, changes, f"profiles.{profile}")
+    plain = YAML(typ="safe", pure=True).load(_dump(YAML(), params))
+    return parse_config(plain, f"{PARAMS_FILE}, profile {profile!r}")
+
+
+def _bring_recordings(root: Path, target: Path, params: dict[str, Any], config: Config) -> None:
+    """Copy recordings that nothing can make into the workspace's ``data``, and point to them."""
+    for name in config.active_cases:
+        source = config.cases[name].source
+        if source.maker != "none":
+            continue
+        origin = (root / Path(source.folder).expanduser()).resolve()
+        if not origin.is_dir():
+            raise OdisarError(
+                f"cases.{name}.source.folder={source.folder}: there is no such folder; "
+                "say where the recordings lie"
+            )
+        _mirror(origin, target / "data" / name)
+        params["cases"][name]["source"]["folder"] = f"data/{name}"
+
+
+def _mirror(origin: Path, target: Path) -> None:
+    """Make ``target`` a copy of ``origin``; files that have not changed are left alone."""
+    wanted = {path.relative_to(origin) for path in origin.rglob("*") if path.is_file()}
+    for path in [path for path in target.rglob("*") if not path.is_dir()]:
+        if path.relative_to(target) not in wanted:
+            path.unlink()
+    for name in sorted(wanted):
+        copy = target / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        if not copy.exists() or _stamp(copy) != _stamp(origin / name):
+            shutil.copy2(origin / name, copy)
+    for folder in sorted((path for path in target.rglob("*") if path.is_dir()), reverse=True):
+        if not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_size, status.st_mtime_ns
 
 
 def merge(values: dict[str, Any], changes: Mapping[str, Any], origin: str) -> None:

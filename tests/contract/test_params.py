@@ -7,9 +7,11 @@ from ruamel.yaml import YAML
 
 from odisar.config.loader import ConfigView, load_config, parse_config
 from odisar.errors import OdisarError
+from odisar.simulators import robot
 from odisar.simulators.vessel.runs import CHANNELS
+from odisar.sources import omni3
 from odisar.sources.gunnerus import CHANNEL_NAMES
-from odisar.workspaces import merge
+from odisar.workspaces import merge, merge_profile
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -19,7 +21,7 @@ def raw():
     return YAML(typ="safe", pure=True).load((ROOT / "params.yaml").read_text())
 
 
-def test_the_file_is_valid_and_no_number_is_read_as_text(raw):
+def test_the_file_is_valid_and_no_exponent_makes_a_number_text(raw):
     load_config(ROOT)
 
     def texts(value):
@@ -34,15 +36,14 @@ def test_the_file_is_valid_and_no_number_is_read_as_text(raw):
             float(text)
         except ValueError:
             return False
-        return True
+        return not text.isdecimal()  # the unit "1" and the name of a session are meant as text
 
     assert [text for text in texts(raw) if is_number(text)] == []
 
 
 @pytest.mark.parametrize("profile", ["smoke", "real", "paper"])
 def test_every_profile_is_valid(raw, profile):
-    merge(raw, raw["profiles"][profile], profile)
-    parse_config(raw, profile)
+    merge_profile(raw, profile)
 
 
 @pytest.mark.parametrize(
@@ -101,5 +102,13 @@ def test_the_real_vessels_channels_are_those_of_its_conversion():
     assert config.cases["gunnerus"].rate_hz == config.sources.gunnerus.rate_hz
 
 
-def test_the_simulated_vessels_channels_are_those_of_its_simulator():
-    assert tuple(load_config(ROOT).cases["vessel"].channel_names) == tuple(CHANNELS)
+def test_the_simulated_channels_are_those_of_their_simulators():
+    cases = load_config(ROOT).cases
+    assert tuple(cases["vessel"].channel_names) == tuple(CHANNELS)
+    assert set(cases["robot"].channel_names) <= {*robot.CHANNELS, *robot.RANGE_CHANNELS}
+
+
+def test_the_real_robots_channels_are_those_of_its_conversion():
+    config = load_config(ROOT)
+    assert tuple(config.cases["omni3"].channel_names) == tuple(omni3.CHANNEL_NAMES)
+    assert config.cases["omni3"].rate_hz == config.sources.omni3.rate_hz

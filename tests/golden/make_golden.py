@@ -137,7 +137,7 @@ def cosine_twin() -> TrainedTwin:
         detach_reconstruction=False,
     )
     spec = WindowSpec(context_steps=20, horizon_steps=10, outputs=(1, 2), known_ahead=())
-    network = TwinTransformer(config, spec, channels=3)
+    network = TwinTransformer(config, spec, features=3)
     with torch.no_grad():
         for number, weight in enumerate(network.parameters()):
             ramp = torch.arange(weight.numel(), dtype=torch.float64)
@@ -147,7 +147,12 @@ def cosine_twin() -> TrainedTwin:
         for name, site in network.named_modules()
         if isinstance(site, Dropout)
     }
-    scaler = Scaler(np.array([0.0, 2.0, -1.0]), np.array([10.0, 0.5, 1.5]))
+    scaler = Scaler(
+        np.array([0.0, 2.0, -1.0]),
+        np.array([10.0, 0.5, 1.5]),
+        np.array([2.0, -1.0]),
+        np.array([0.5, 1.5]),
+    )
     names = ("Rudder", "Speed", "Turn Rate")
     return TrainedTwin(network.eval(), config, spec, scaler, masks, names)
 

@@ -11,7 +11,7 @@ from safetensors.torch import save_file
 from odisar.twin import training
 from odisar.twin.devices import use_one_thread
 from odisar.windows.scaling import Scaler
-from odisar.windows.windowing import WindowSet
+from odisar.windows.window_set import WindowSet
 from small_system import SPEC, make_recording, small_plan
 
 
@@ -28,7 +28,7 @@ def main(checkpoints: Path) -> None:
         small_plan(), training=small_plan().training.model_copy(update={"epochs": 4})
     )
     train = [make_recording(f"train-{i}") for i in range(4)]
-    scaler = Scaler.fit(train)
+    scaler = Scaler.fit(train, SPEC)
     validation = WindowSet([make_recording("v")], scaler, SPEC, stride_steps=10)
     if "--slowly" in sys.argv:
         build = training.build_trainer

@@ -6,7 +6,7 @@ from odisar.config.learning import LearningRateRange, TuningConfig
 from odisar.twin.devices import use_one_thread
 from odisar.twin.tuning import tune_twin
 from odisar.windows.scaling import Scaler
-from odisar.windows.windowing import WindowSet
+from odisar.windows.window_set import WindowSet
 from small_system import SPEC, make_recording, small_plan
 
 TUNING = TuningConfig(
@@ -25,7 +25,7 @@ TUNING = TuningConfig(
 def main(journal: str) -> None:
     use_one_thread()
     train = [make_recording(f"train-{i}") for i in range(3)]
-    scaler = Scaler.fit(train)
+    scaler = Scaler.fit(train, SPEC)
     validation = WindowSet([make_recording("v")], scaler, SPEC, stride_steps=10)
     windows = WindowSet(train, scaler, SPEC), validation
     tune_twin(small_plan(), TUNING, windows, journal, "shared")

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from odisar.capability.scoring import DETECTORS, ODISAR, Scorer
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
+from odisar.windows.scaling import channel_std
 from small_system import make_recording
 
 SAMPLES = 120
@@ -19,43 +20,56 @@ def with_values(values: np.ndarray) -> Recording:
     return Recording("causal", RECORDING.info, RECORDING.time_s, values)
 
 
+@pytest.fixture(params=["trained_twin", "relative_twin"])
+def twin(request) -> TrainedTwin:
+    return request.getfixturevalue(request.param)
+
+
+def first_position(twin: TrainedTwin) -> int:
+    """Return the first sample that has a score."""
+    return int(twin.spec.issue_positions((0, SAMPLES), 1)[0])
+
+
 def all_scores(twin: TrainedTwin, values: np.ndarray, batch: int = 32) -> dict[str, np.ndarray]:
     scores = Scorer(twin, batch, "cpu").score(with_values(values), short_lead_steps=LEAD)
     return dict(scores.scores)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(position=st.integers(40, SAMPLES - 2), push=st.floats(-1e3, 1e3), data=st.data())
-def test_nothing_after_t_moves_a_score_at_or_before_t(trained_twin, position, push, data):
+def test_nothing_after_t_moves_a_score_at_or_before_t(twin, position, push, data):
     channel = data.draw(st.integers(0, 2))
     changed = RECORDING.values.copy()
     changed[position + 1 :, channel] += push
-    before, after = all_scores(trained_twin, RECORDING.values), all_scores(trained_twin, changed)
-    upto = position - 19 + 1  # scores begin at sample 19
+    before, after = all_scores(twin, RECORDING.values), all_scores(twin, changed)
+    upto = position - first_position(twin) + 1
     for detector in DETECTORS:
         np.testing.assert_array_equal(before[detector][:upto], after[detector][:upto])
 
 
 @pytest.mark.parametrize("detector", DETECTORS)
 @pytest.mark.parametrize("position", [60, SAMPLES - 1])
-def test_one_sigma_at_t_moves_the_score_at_t(trained_twin, detector, position):
+def test_one_sigma_at_t_moves_the_score_at_t(twin, detector, position):
     changed = RECORDING.values.copy()
-    changed[position] += trained_twin.scaler.std
-    before = all_scores(trained_twin, RECORDING.values)[detector][position - 19]
-    after = all_scores(trained_twin, changed)[detector][position - 19]
+    changed[position] += channel_std([RECORDING])
+    at = position - first_position(twin)
+    before = all_scores(twin, RECORDING.values)[detector][at]
+    after = all_scores(twin, changed)[detector][at]
     assert abs(after - before) > 1e-4
 
 
 @pytest.mark.parametrize("batch", [1, 7, 101])
-def test_no_score_depends_on_how_windows_are_batched(trained_twin, batch):
-    together = all_scores(trained_twin, RECORDING.values)
-    otherwise = all_scores(trained_twin, RECORDING.values, batch)
+def test_no_score_depends_on_how_windows_are_batched(twin, batch):
+    together = all_scores(twin, RECORDING.values)
+    otherwise = all_scores(twin, RECORDING.values, batch)
     for detector in DETECTORS:
         np.testing.assert_allclose(together[detector], otherwise[detector], atol=2e-6)
 
 
-def test_the_variance_of_a_window_depends_on_nothing_later_or_beside_it(trained_twin):
-    scorer = Scorer(trained_twin, 32, "cpu")
+def test_the_variance_of_a_window_depends_on_nothing_later_or_beside_it(twin):
+    scorer = Scorer(twin, 32, "cpu")
     positions = np.arange(40, 100, 7)
     whole = scorer.variances(with_values(RECORDING.values), positions)
     changed = RECORDING.values.copy()
@@ -67,7 +81,7 @@ def test_the_variance_of_a_window_depends_on_nothing_later_or_beside_it(trained_
     np.testing.assert_allclose(alone, whole[3:4], rtol=1e-4)
 
 
-def test_the_last_sample_of_a_recording_is_scored(trained_twin):
-    scores = Scorer(trained_twin, 32, "cpu").score(RECORDING, short_lead_steps=LEAD)
+def test_the_last_sample_of_a_recording_is_scored(twin):
+    scores = Scorer(twin, 32, "cpu").score(RECORDING, short_lead_steps=LEAD)
     assert scores.positions[-1] == SAMPLES - 1
     assert np.isfinite(scores.scores[ODISAR]).all()

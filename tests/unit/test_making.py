@@ -20,6 +20,7 @@ from small_system import make_recording
 def workspace(tmp_path, request):
     """A folder that holds the shipped parameters and nothing else."""
     shutil.copyfile(request.config.rootpath / "params.yaml", tmp_path / "params.yaml")
+    change(tmp_path, "pipeline", "setups", value=["vessel-all"])
     return tmp_path
 
 
@@ -62,7 +63,7 @@ def test_missing_recordings_are_made_with_their_recipe(workspace, simulated):
     assert names == ["labels.csv", "recordings.csv", "run-a.csv", "run-b.csv"]
     header = (workspace / "data/vessel/run-a.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header.split(",") == ["time_s", *CHANNELS]
-    check_recipe(workspace, "vessel", load_config(workspace).simulators.recipe())
+    check_recipe(workspace, "vessel", load_config(workspace).recipe_of("vessel"))
 
 
 def test_recordings_of_the_same_recipe_are_left_as_they_are(workspace, simulated):
@@ -84,13 +85,13 @@ def test_a_changed_simulator_makes_them_anew_and_removes_what_it_had_made(worksp
         (workspace / f"data/vessel/{name}.csv").write_text("time_s\n")
     change(workspace, "simulators", "vessel", "event", "onset_s", value=400.0)
     with pytest.raises(OdisarError, match="other values under `simulators`"):
-        check_recipe(workspace, "vessel", load_config(workspace).simulators.recipe())
+        check_recipe(workspace, "vessel", load_config(workspace).recipe_of("vessel"))
     make_recordings(workspace)
     assert len(simulated) == 2
     assert first_row(workspace) != before
     assert not (workspace / "data/vessel/run-c.csv").exists()
     assert (workspace / "data/vessel/not-listed.csv").exists()
-    check_recipe(workspace, "vessel", load_config(workspace).simulators.recipe())
+    check_recipe(workspace, "vessel", load_config(workspace).recipe_of("vessel"))
 
 
 def test_recordings_of_unknown_origin_are_refused_and_kept(workspace, simulated):

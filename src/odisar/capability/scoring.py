@@ -17,6 +17,8 @@ from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from odisar.twin.mc_dropout import draw_forecasts
 from odisar.twin.transformer import TwinOutput
+from odisar.windows.targets import horizon_targets
+from odisar.windows.window_set import model_inputs, scaled_features
 
 #: Names of the deployable detectors whose scores a recording gets.
 ODISAR, RMSE, RMSE_SHORT = "odisar", "rmse", "rmse-short-lead"
@@ -55,12 +57,14 @@ class Scorer:
         horizon = self.twin.spec.horizon_steps
         parts: list[RecordingScores] = []
         samples = self._samples(recording)
-        for start, stop in recording.segments:
-            positions = self._scorable(start, stop)
+        needed_after = horizon if self.twin.spec.known_ahead else 0
+        for segment in recording.segments:
+            positions = self.twin.spec.issue_positions(segment, 1, horizon_steps=needed_after)
             if positions.size == 0:
                 continue
+            observed = recording.values[: segment[1]]
             state_errors, full, short = self._score_segment(
-                samples[:stop], positions, short_lead_steps
+                samples, observed, positions, short_lead_steps
             )
             scores = {
                 ODISAR: reconstruction_error(state_errors),
@@ -85,22 +89,19 @@ class Scorer:
 
     def forecast(self, recording: Recording, positions: NDArray[np.int64]) -> TwinOutput:
         """Return forecasts and reconstructions (window, step, state), scaled, on the CPU."""
-        outputs = [
-            self._forecast(self._samples(recording), chunk)
-            for chunk in _chunks(positions, self._batch)
-        ]
+        samples = self._samples(recording)
+        outputs = [self._forecast(samples, chunk) for chunk in _chunks(positions, self._batch)]
         return TwinOutput(
             torch.cat([output.forecast for output in outputs]),
             torch.cat([output.reconstruction for output in outputs]),
         )
 
-    def _scorable(self, start: int, stop: int) -> NDArray[np.int64]:
-        spec = self.twin.spec
-        needed_after = spec.horizon_steps if spec.known_ahead else 0
-        return np.arange(start + spec.context_steps - 1, stop - needed_after, dtype=np.int64)
-
     def _score_segment(
-        self, samples: torch.Tensor, positions: NDArray[np.int64], short_lead: int
+        self,
+        samples: torch.Tensor,
+        observed: NDArray[np.float64],
+        positions: NDArray[np.int64],
+        short_lead: int,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
         spec = self.twin.spec
         state_errors, full, short = [], [], []
@@ -110,7 +111,7 @@ class Scorer:
             state_errors.append(
                 state_reconstruction_errors(forecast, output.reconstruction.numpy())
             )
-            truth = _futures(samples, chunk, spec.horizon_steps)[..., list(spec.outputs)]
+            truth = self.twin.scaler.scale_targets(horizon_targets(observed, chunk, spec))
             full.append(forecast_rmse(forecast, truth, spec.horizon_steps))
             short.append(forecast_rmse(forecast, truth, short_lead))
         return np.concatenate(state_errors), np.concatenate(full), np.concatenate(short)
@@ -123,28 +124,12 @@ class Scorer:
     def _inputs(
         self, samples: torch.Tensor, positions: NDArray[np.int64]
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        spec = self.twin.spec
-        back = torch.arange(1 - spec.context_steps, 1)
-        context = samples[torch.from_numpy(positions)[:, None] + back]
-        known = torch.empty(len(positions), spec.horizon_steps, 0)
-        if spec.known_ahead:
-            known = torch.from_numpy(_futures(samples, positions, spec.horizon_steps))
-            known = known[..., list(spec.known_ahead)]
+        channels = len(self.twin.channel_names)
+        context, known = model_inputs(samples, positions, self.twin.spec, channels)
         return context.to(self._device), known.to(self._device)
 
     def _samples(self, recording: Recording) -> torch.Tensor:
-        return torch.from_numpy(self.twin.scaler.scale(recording.values))
-
-
-def _futures(
-    samples: torch.Tensor, positions: NDArray[np.int64], horizon: int
-) -> NDArray[np.float32]:
-    """Return (window, step, channel) samples after t, NaN beyond the segment's end."""
-    padded = np.vstack(
-        [samples.numpy(), np.full((horizon, samples.shape[1]), np.nan, dtype=np.float32)]
-    )
-    steps: NDArray[np.float32] = padded[positions[:, None] + np.arange(1, horizon + 1)]
-    return steps
+        return scaled_features([recording], self.twin.scaler, self.twin.spec)
 
 
 def _chunks(positions: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:

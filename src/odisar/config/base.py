@@ -1,9 +1,12 @@
-"""What every section of ``params.yaml`` is: frozen, complete, and without unknown keys."""
+"""What every section of ``params.yaml`` is: frozen, complete, strict, without unknown keys."""
 
 from pydantic import BaseModel, ConfigDict
 
 
 class Section(BaseModel):
-    """A section of the configuration. It has no defaults: ``params.yaml`` is the only source."""
+    """A section of the configuration. It has no defaults: ``params.yaml`` is the only source.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    Strict: ``epochs: true`` or ``epochs: "5"`` is refused instead of being taken for a number.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

@@ -6,10 +6,15 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from odisar.config.base import Section
+from odisar.config.formats import BagFormat, CsvFormat
 
 PositiveInt = Annotated[int, Field(gt=0)]
 PositiveFloat = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
+
+#: What can make a case's recordings where they are missing.
+Maker = Literal["ferry-simulator", "gunnerus-trial", "robot-simulator", "omni3-runs", "none"]
+FaultKind = Literal["noise", "bias", "drift", "stuck", "delay"]
 
 
 class Channel(Section):
@@ -43,16 +48,42 @@ class Channel(Section):
 
 
 class Source(Section):
-    """Where a case's recordings lie: a folder of CSV files, with or without ``recordings.csv``.
+    """Where a case's recordings lie and how their files are read.
 
-    ``maker`` says what makes them where they are missing: the ferry simulator, the download of R/V
-    Gunnerus' sea trial, or nothing (they are yours).
+    ``maker`` says what makes them where they are missing: a simulator, a download, or nothing
+    (they are yours). ``csv`` and ``bag`` (see ``config.formats``) say how such files are read;
+    ``bag`` may be null where there are none. ``resample: hold`` puts every recording on a grid of
+    ``rate_hz``, holding the last sample (so that nothing looks ahead); ``none`` takes the samples
+    as they are recorded.
     """
 
     folder: str
-    maker: Literal["ferry-simulator", "gunnerus-trial", "none"]
+    maker: Maker
     time_column: str
     max_recordings: PositiveInt
+    csv: CsvFormat
+    bag: BagFormat | None
+    resample: Literal["none", "hold"]
+
+
+class Pose(Section):
+    """Which channels are a planar pose, and in which coordinates the twin sees it.
+
+    ``heading`` names one channel (an angle in rad or deg) or two (z and w of a quaternion about
+    the vertical axis). ``absolute`` takes the channels as they are. ``relative`` gives the twin
+    the pose's increments, divided by the difference of their stamps, and lets it forecast the
+    displacement in the frame of the last pose (see ``windows.coordinates``).
+    """
+
+    x: str
+    y: str
+    heading: Annotated[list[str], Field(min_length=1, max_length=2)]
+    coordinates: Literal["absolute", "relative"]
+
+    @property
+    def channels(self) -> list[str]:
+        """Names of all channels of the pose."""
+        return [self.x, self.y, *self.heading]
 
 
 class WindowConfig(Section):
@@ -92,23 +123,46 @@ class Splits(Section):
         return self
 
 
+class Span(Section):
+    """A length in seconds drawn evenly between two, both included."""
+
+    low: PositiveFloat
+    high: PositiveFloat
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.low > self.high:
+            raise ValueError(f"low={self.low} is above high={self.high}; swap them")
+        return self
+
+
 class Faults(Section):
     """Sensor faults to inject into copies of held-out recordings (see ``recordings.faults``).
 
-    ``sizes`` are multiples of the channel's standard deviation over the training recordings for
-    noise, bias and drift (drift: at the end of the interval); ``delays_s`` are for delay.
+    ``sizes`` lists, by kind, the sizes of noise (its standard deviation), bias and drift (at the
+    end of the interval), in standard deviations of the channel over the training recordings
+    (``sizes_in: sd``) or in the channel's unit; ``delays_s`` are for delay.
     A stuck or delayed sensor differs from a sound one only while its channel moves: a copy that
     never differs by ``shows_from_sd`` standard deviations is marked ``hidden`` in the metadata
     column ``fault_shows``, any other ``shows``.
     """
 
-    kinds: list[Literal["noise", "bias", "drift", "stuck", "delay"]]
+    kinds: list[FaultKind]
     channels: list[str]
-    sizes: list[PositiveFloat]
+    sizes: dict[FaultKind, list[PositiveFloat]]
+    sizes_in: Literal["sd", "unit"]
     delays_s: list[PositiveFloat]
     start_s: PositiveFloat
-    duration_s: PositiveFloat
+    duration_s: Span
     shows_from_sd: PositiveFloat
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for kind in self.kinds:
+            sizes = self.delays_s if kind == "delay" else self.sizes.get(kind)
+            if kind != "stuck" and not sizes:
+                raise ValueError(f"faults: {kind} is among kinds but has no size; add one")
+        return self
 
 
 class RangeRule(Section):
@@ -143,6 +197,7 @@ class Case(Section):
     rate_hz: PositiveFloat
     max_gap_s: PositiveFloat
     channels: Annotated[list[Channel], Field(min_length=1)]
+    pose: Pose | None
     window: WindowConfig
     splits: Splits
     persistence_s: PositiveFloat
@@ -175,10 +230,39 @@ class Case(Section):
         self._check_times()
         mentioned = [rule.channel for rule in self.range_rules]
         mentioned += self.faults.channels if self.faults else []
+        mentioned += self.pose.channels if self.pose else []
+        mentioned += list(self.source.bag.fields) if self.source.bag else []
         for name in mentioned:
             if name not in names:
                 raise ValueError(f"{name!r} is not one of the channels: {', '.join(names)}")
+        self._check_pose()
+        self._check_bag()
         return self
+
+    def _check_bag(self) -> None:
+        taken = self.source.bag.fields if self.source.bag else None
+        missing = [name for name in self.channel_names if taken is not None and name not in taken]
+        if missing:
+            raise ValueError(
+                f"source.bag.fields: no field for {', '.join(missing)}; every channel needs one"
+            )
+
+    def _check_pose(self) -> None:
+        if self.pose is None:
+            return
+        if len(set(self.pose.channels)) < len(self.pose.channels):
+            raise ValueError("pose: a channel is named twice")
+        by_name = {channel.name: channel for channel in self.channels}
+        commands = [name for name in self.pose.channels if by_name[name].role == "command"]
+        if commands:
+            raise ValueError(f"pose: {', '.join(commands)} must be states, not commands")
+        if len(self.pose.heading) == 1:
+            unit = by_name[self.pose.heading[0]].unit
+            if not unit.casefold().startswith(("rad", "deg", "°")):
+                raise ValueError(
+                    f"pose.heading: {self.pose.heading[0]!r} is in {unit!r}; an angle is in rad or "
+                    "deg (or name z and w of a quaternion)"
+                )
 
     def _check_times(self) -> None:
         """Raise where a block or a fault has no room for what it must hold."""
@@ -190,10 +274,10 @@ class Case(Section):
                     f"splits.block_s={block_s:g} is shorter than a window of {window_s:g} s; "
                     "lengthen it or shorten the window"
                 )
-            if self.faults and block_s < self.faults.start_s + self.faults.duration_s:
+            if self.faults and block_s < self.faults.start_s + self.faults.duration_s.high:
                 raise ValueError(
                     f"splits.block_s={block_s:g} is shorter than faults.start_s + "
-                    "faults.duration_s; a fault would not fit into a block"
+                    "faults.duration_s.high; a fault would not fit into a block"
                 )
 
     @property

@@ -8,14 +8,17 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from odisar.config.base import Section
-from odisar.config.cases import Case, PositiveInt, Setup
+from odisar.config.cases import Case, Maker, PositiveInt, Setup
 from odisar.config.judging import CapabilityConfig, EvaluationConfig
 from odisar.config.learning import MonteCarloConfig, TrainingConfig, TuningConfig, TwinConfig
-from odisar.config.simulators import SimulatorsConfig
+from odisar.config.registry import RegistryConfig
+from odisar.config.simulators import Simulator, SimulatorsConfig
 from odisar.config.sources import SourcesConfig
 from odisar.errors import OdisarError
 
 PARAMS_FILE = "params.yaml"
+
+_SIMULATORS: dict[Maker, Simulator] = {"ferry-simulator": "vessel", "robot-simulator": "robot"}
 
 #: Set-ups and cases name files and metrics.
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -56,6 +59,7 @@ class Config(Section):
     capability: CapabilityConfig
     evaluation: EvaluationConfig
     tracking: TrackingConfig
+    registry: RegistryConfig
     report: ReportConfig
     simulators: SimulatorsConfig
     sources: SourcesConfig
@@ -121,10 +125,18 @@ class Config(Section):
         return list(dict.fromkeys(self.setups[name].case for name in self.pipeline.setups))
 
     @property
-    def simulates_the_ferry(self) -> bool:
-        """Whether an active case's recordings come from the ferry simulator."""
+    def active_simulators(self) -> list[Simulator]:
+        """The simulators that make recordings of active cases, in order, once each."""
         makers = [self.cases[name].source.maker for name in self.active_cases]
-        return "ferry-simulator" in makers
+        return list(dict.fromkeys(_SIMULATORS[maker] for maker in makers if maker in _SIMULATORS))
+
+    def recipe_of(self, case_name: str) -> str | None:
+        """Return the hash of what decides a simulated case's recordings, None for any other."""
+        case = self.cases[case_name]
+        simulator = _SIMULATORS.get(case.source.maker)
+        if simulator is None:
+            return None
+        return self.simulators.recipe(simulator, case.channel_names)
 
 
 class ConfigView:
@@ -142,7 +154,7 @@ class ConfigView:
         """Return a declared section."""
         if name.startswith("_"):  # asked for while a copy for another process is being built
             raise AttributeError(name)
-        if name in ("case_of", "active_cases", "simulates_the_ferry"):
+        if name in ("case_of", "active_cases", "active_simulators", "recipe_of"):
             return getattr(self._config, name)
         if name not in self.sections:
             raise AttributeError(

@@ -1,30 +1,18 @@
 """Sections for the simulators: the ferry, its weather, its manoeuvres and the fleet of runs."""
 
 import hashlib
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from odisar.config.base import Section
 from odisar.config.cases import Fraction, PositiveFloat, PositiveInt
+from odisar.config.ranges import NonNegativeFloat, NonNegativeInt, Share
+from odisar.config.ranges import Range as Range  # noqa: PLC0414 (the ferry imports it here)
+from odisar.config.robot import RobotSimulatorConfig
 
-NonNegativeInt = Annotated[int, Field(ge=0)]
-NonNegativeFloat = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
 Angle = Annotated[int, Field(gt=0, le=90)]
-
-
-class Range(Section):
-    """The lower and the upper end of what is drawn, both included."""
-
-    low: float
-    high: float
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.low > self.high:
-            raise ValueError(f"low={self.low} is above high={self.high}; swap them")
-        return self
 
 
 class WindageConfig(Section):
@@ -230,12 +218,17 @@ class VesselSimulatorConfig(Section):
         return self
 
 
+Simulator = Literal["vessel", "robot"]
+
+
 class SimulatorsConfig(Section):
     """All simulators."""
 
     seed: Annotated[int, Field(ge=0)]
     vessel: VesselSimulatorConfig
+    robot: RobotSimulatorConfig
 
-    def recipe(self) -> str:
-        """Return the hash of everything that decides the simulated recordings but the code."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
+    def recipe(self, simulator: Simulator, channel_names: Sequence[str]) -> str:
+        """Return the hash of everything that decides a simulator's recordings but the code."""
+        decisive = [self.model_dump_json(include={"seed", simulator}), *channel_names]
+        return hashlib.sha256("\n".join(decisive).encode()).hexdigest()

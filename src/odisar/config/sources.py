@@ -9,22 +9,38 @@ from odisar.config.base import Section
 from odisar.config.cases import PositiveFloat, PositiveInt
 
 
-class PinnedFile(Section):
-    """A published file that never changes: an address with its commit, and the file's SHA-256.
+class Pinned(Section):
+    """Something published that never changes: its address, with the commit, and its terms.
 
     Where ``environment_variable`` is set, the local copy it names is read instead. ``folder`` is
-    relative to the project's root and ignored by git.
+    relative to the project's root and ignored by git. ``size_limit_mb`` is that of one file.
     """
 
     url: Annotated[str, Field(pattern=r"^https://\S+$")]
-    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    file_name: Annotated[str, Field(pattern=r"^[\w][\w.-]*$")]
     folder: str
     environment_variable: Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]*$")]
     size_limit_mb: PositiveFloat
     timeout_s: PositiveFloat
     licence: str
     credit: str
+
+
+class PinnedFile(Pinned):
+    """One published file and its SHA-256."""
+
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    file_name: Annotated[str, Field(pattern=r"^[\w][\w.-]*$")]
+
+
+class PinnedFolder(Pinned):
+    """Published files below one address.
+
+    ``registry`` is a file beside the code of ``odisar.sources``: a line for each published file
+    with its path below the address and its SHA-256 (the format of pooch's registries).
+    """
+
+    url: Annotated[str, Field(pattern=r"^https://\S+/$")]
+    registry: Annotated[str, Field(pattern=r"^[\w][\w.-]*$")]
 
 
 class Regime(Section):
@@ -84,7 +100,47 @@ class GunnerusConfig(Section):
         return self.raw_rate_hz / self.average_samples
 
 
+class ExcludedSession(Section):
+    """A session that is left out whole, and why."""
+
+    session: Annotated[str, Field(pattern=r"^\d+$")]
+    reason: Annotated[str, Field(min_length=1)]
+
+
+class Omni3Config(Section):
+    """Tracked runs of a three-wheel robot: the published files and their conversion.
+
+    ``uses`` says of each manoeuvre (a folder of the published files) whether its runs are normal
+    (``reference``) or only tested as ``novel``. ``split_cycle`` is dealt over the reference runs
+    in the order of manoeuvre, session and run, over and over.
+    """
+
+    files: PinnedFolder
+    raw_rate_hz: PositiveFloat
+    rate_hz: PositiveFloat
+    uses: dict[str, Literal["reference", "novel"]]
+    excluded: list[ExcludedSession]
+    split_cycle: list[Literal["train", "validation", "calibration", "test"]]
+    minimum_s: PositiveFloat
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.rate_hz > self.raw_rate_hz:
+            raise ValueError(
+                f"rate_hz={self.rate_hz} must not be above raw_rate_hz={self.raw_rate_hz}: "
+                "samples would be repeated"
+            )
+        missing = {"train", "validation", "calibration", "test"} - set(self.split_cycle)
+        if missing:
+            raise ValueError(f"split_cycle: {', '.join(sorted(missing))} has no place in it")
+        sessions = [item.session for item in self.excluded]
+        if len(set(sessions)) < len(sessions):
+            raise ValueError(f"excluded: a session is named twice in {', '.join(sessions)}")
+        return self
+
+
 class SourcesConfig(Section):
     """Public recordings that the project downloads and converts."""
 
     gunnerus: GunnerusConfig
+    omni3: Omni3Config

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odisar.config.cases import Case, Channel
-from odisar.recordings.csv_reader import Columns
-from odisar.recordings.quality import ROWS_LISTED, Notes, Severity
+from odisar.recordings.quality import Notes
+from odisar.recordings.resampling import grid_steps
+from odisar.recordings.table import Advice, Table, note_rows
 
 #: A measured rate this far from the declared one is another rate, not a drifting clock.
 RATE_TOLERANCE = 0.01
@@ -20,51 +21,35 @@ _UNIT_SHARE = 0.05
 Segments = tuple[tuple[int, int], ...]
 
 
-def check_columns(columns: Columns, case: Case, notes: Notes) -> Segments:
-    """Check a file whose first column is time and whose others are the case's channels.
+def check_table(table: Table, case: Case, notes: Notes) -> Segments:
+    """Check a table whose first column is time and whose others are the case's channels.
 
-    Returns the half-open sample ranges between gaps; what is wrong goes to ``notes``.
+    Returns the half-open ranges of its rows between gaps; what is wrong goes to ``notes``.
     """
-    if len(columns.values) == 0:
-        notes.error("the file has no samples", "export it again, or remove it", row=1)
+    if len(table.values) == 0:
+        row = table.advice.header_row
+        notes.error("the file has no samples", "export it again, or remove it", row=row)
         return ()
     for i, channel in enumerate(case.channels, start=1):
-        if columns.present[i]:
-            _check_channel(columns.values[:, i], columns.lines, channel, notes)
-    if not columns.present[0]:
+        if table.present[i]:
+            _check_channel(table, i, channel, notes)
+    if not table.present[0]:
         return ()
-    segments = check_times(columns.values[:, 0], columns.lines, case, notes)
-    _check_lengths(segments, columns, case, notes)
+    segments = check_times(table, case, notes)
+    _check_lengths(segments, table, case, notes)
     return segments
 
 
-def _note(
-    notes: Notes,
-    severity: Severity,
-    column: str,
-    problem: str,
-    remedy: str,
-    lines: NDArray[np.int64],
-    values: NDArray[np.float64],
-) -> None:
-    cells = [
-        (int(line), f"{value:.12g}")
-        for line, value in zip(lines[:ROWS_LISTED], values[:ROWS_LISTED], strict=True)
-    ]
-    notes.rows(problem, remedy, cells, column=column, severity=severity, total=len(lines))
-
-
-def _check_channel(
-    values: NDArray[np.float64], lines: NDArray[np.int64], channel: Channel, notes: Notes
-) -> None:
+def _check_channel(table: Table, column: int, channel: Channel, notes: Notes) -> None:
+    values, lines = table.values[:, column], table.lines
     outside = (values < channel.min) | (values > channel.max)
     if outside.any():
-        _note(
+        note_rows(
             notes,
             "error",
             channel.name,
             f"the value is outside {channel.min:g} to {channel.max:g} {channel.unit}",
-            _range_remedy(values, channel, float(outside.mean())),
+            _range_remedy(values, channel, float(outside.mean()), table.advice),
             lines[outside],
             values[outside],
         )
@@ -87,9 +72,11 @@ def _check_channel(
             )
 
 
-def _range_remedy(values: NDArray[np.float64], channel: Channel, outside: float) -> str:
+def _range_remedy(
+    values: NDArray[np.float64], channel: Channel, outside: float, advice: Advice
+) -> str:
     """Say what to do about values outside the limits, which are this share of the column."""
-    plain = "mend the value, leave the line out, or widen the channel's min and max"
+    plain = f"{advice.outside}, or widen the channel's min and max"
     unit = channel.unit.casefold()
     # A few values outside are outliers; another unit moves many.
     if outside < _UNIT_SHARE:
@@ -106,14 +93,13 @@ def _range_remedy(values: NDArray[np.float64], channel: Channel, outside: float)
     return plain
 
 
-def check_times(
-    time_s: NDArray[np.float64], lines: NDArray[np.int64], case: Case, notes: Notes
-) -> Segments:
-    """Check the order and the rate of ``time_s`` (row,), NaN where unknown; return the segments.
+def check_times(table: Table, case: Case, notes: Notes) -> Segments:
+    """Check the order and the rate of a table's times, NaN where unknown; return the segments.
 
     A step longer than the case's ``max_gap_s`` is a gap. Gaps are only looked for where order and
     rate are right: otherwise every step would be one.
     """
+    time_s, lines = table.values[:, 0], table.lines
     known = np.flatnonzero(~np.isnan(time_s))
     whole: Segments = ((0, len(time_s)),)
     if len(known) < 2:
@@ -122,21 +108,20 @@ def check_times(
     after = known[1:]
     name = case.source.time_column
     for wrong, problem, remedy in (
-        (steps_s == 0, "the time stamp is repeated", "remove one of the two lines"),
-        (steps_s < 0, "the time goes back", "sort the lines by time"),
+        (steps_s == 0, "the time stamp is repeated", table.advice.repeated),
+        (steps_s < 0, "the time goes back", table.advice.backward),
     ):
         if wrong.any():
             at = after[wrong]
-            _note(notes, "error", name, problem, remedy, lines[at], time_s[at])
+            note_rows(notes, "error", name, problem, remedy, lines[at], time_s[at])
     # A line that could not be read is not a gap: its error is in the notes.
     adjoining = (np.diff(known) == 1) & (steps_s > 0)
-    if not adjoining.any() or not _check_rate(steps_s[adjoining], case, notes):
+    if not adjoining.any() or not _check_pace(steps_s, adjoining, lines[after], case, notes):
         return whole
-    _check_jitter(steps_s, adjoining, lines[after], case, notes)
     gaps = adjoining & (steps_s > case.max_gap_s)
     if not gaps.any():
         return whole
-    _note(
+    note_rows(
         notes,
         "warning",
         name,
@@ -147,6 +132,35 @@ def check_times(
     )
     borders = [0, *after[gaps].tolist(), len(time_s)]
     return tuple(itertools.pairwise(borders))
+
+
+def _check_pace(
+    steps_s: NDArray[np.float64],
+    adjoining: NDArray[np.bool_],
+    lines: NDArray[np.int64],
+    case: Case,
+    notes: Notes,
+) -> bool:
+    """Return whether the samples come as the case says, or faster where they are resampled."""
+    if case.source.resample == "hold":
+        return _check_not_slower(steps_s[adjoining], case, notes)
+    if not _check_rate(steps_s[adjoining], case, notes):
+        return False
+    _check_jitter(steps_s, adjoining, lines, case, notes)
+    return True
+
+
+def _check_not_slower(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
+    measured_hz = float(1.0 / np.median(steps_s))
+    if measured_hz >= case.rate_hz * (1.0 - RATE_TOLERANCE):
+        return True
+    notes.error(
+        f"the recording is slower than rate_hz={case.rate_hz:g}",
+        "lower the case's rate_hz (and its steps): source.resample: hold would invent samples",
+        column=case.source.time_column,
+        value=f"{measured_hz:.4g} Hz",
+    )
+    return False
 
 
 def _check_rate(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
@@ -161,9 +175,11 @@ def _check_rate(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
         tolerance = RATE_TOLERANCE + 1.0 / samples
     if abs(measured_hz / case.rate_hz - 1.0) <= tolerance:
         return True
+    faster = measured_hz > case.rate_hz
+    resample = "set source.resample: hold" if faster else "resample the recording"
     notes.error(
         f"the rate is not rate_hz={case.rate_hz:g}",
-        "resample the recording, or change the case's rate_hz (and its steps)",
+        f"{resample}, or change the case's rate_hz (and its steps)",
         column=case.source.time_column,
         value=f"{measured_hz:.4g} Hz",
     )
@@ -182,7 +198,7 @@ def _check_jitter(
     slack_s = 1e-6 * period_s
     dense = adjoining & (steps_s < 0.5 * period_s - slack_s)
     if dense.any():
-        _note(
+        note_rows(
             notes,
             "error",
             name,
@@ -193,7 +209,7 @@ def _check_jitter(
         )
     sparse = adjoining & (steps_s > 1.5 * period_s + slack_s) & (steps_s <= case.max_gap_s)
     if sparse.any():
-        _note(
+        note_rows(
             notes,
             "warning",
             name,
@@ -204,23 +220,33 @@ def _check_jitter(
         )
 
 
-def _check_lengths(segments: Segments, columns: Columns, case: Case, notes: Notes) -> None:
+def _check_lengths(segments: Segments, table: Table, case: Case, notes: Notes) -> None:
     needed = case.window.context_steps + case.window.horizon_steps
-    short = [(start, stop) for start, stop in segments if stop - start < needed]
+    lengths = [_length(table.values[start:stop, 0], case) for start, stop in segments]
     remedy = f"a window takes {needed} samples (context_steps + horizon_steps)"
-    if len(short) == len(segments):
-        longest = max(stop - start for start, stop in segments)
+    if max(lengths) < needed:
         problem = "the recording is" if len(segments) == 1 else "every segment is"
         notes.error(
             f"{problem} shorter than one window",
             f"{remedy}; record for longer or shorten the window",
-            value=f"{longest} samples",
+            value=f"{max(lengths)} samples",
         )
         return
+    short = [
+        (int(table.lines[start]), f"{length} samples")
+        for (start, _), length in zip(segments, lengths, strict=True)
+        if length < needed
+    ]
     notes.rows(
         "the segment after a gap is shorter than context and horizon: nothing is learnt from it",
         remedy,
-        [(int(columns.lines[start]), f"{stop - start} samples") for start, stop in short],
+        short,
         total=len(short),
         severity="warning",
     )
+
+
+def _length(time_s: NDArray[np.float64], case: Case) -> int:
+    """Return the number of samples of a segment, after resampling where it is resampled."""
+    on_grid = case.source.resample == "hold" and bool((np.diff(time_s) > 0).all())
+    return grid_steps(time_s, case.rate_hz) if on_grid else len(time_s)

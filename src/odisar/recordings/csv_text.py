@@ -3,10 +3,8 @@
 import codecs
 from pathlib import Path
 
+from odisar.recordings.file_checks import check_file, note_unreadable
 from odisar.recordings.quality import Notes
-
-#: Larger files are refused: one recording this long does not fit in memory beside its windows.
-MAX_FILE_BYTES = 512 * 1024 * 1024
 
 _UTF8 = "save the file as CSV in UTF-8"
 
@@ -53,23 +51,10 @@ def _looks_binary(raw: bytes) -> bool:
 
 
 def _read_bytes(path: Path, notes: Notes) -> bytes | None:
-    if path.is_dir():
-        notes.error("a folder has the name of a recording", "rename or remove the folder")
+    if not check_file(path, notes):
         return None
     try:
-        size = path.stat().st_size
-        if size > MAX_FILE_BYTES:
-            notes.error(
-                f"the file is larger than the limit of {MAX_FILE_BYTES // 1024**2} MiB",
-                "split it into several recordings",
-                value=f"{size / 1024**2:.0f} MiB",
-            )
-            return None
         return path.read_bytes()
     except OSError as fault:
-        notes.error(
-            "the file cannot be read",
-            "check that it exists and that you may read it",
-            value=fault.strerror or type(fault).__name__,
-        )
+        note_unreadable(fault, notes)
         return None

@@ -1,7 +1,7 @@
 """Sensor faults injected into copies of clean held-out recordings.
 
-The kinds and their sizes in multiples of the channel's standard deviation follow the usual
-taxonomy of sensor faults: noise, bias, drift, stuck and delayed values.
+The kinds follow the usual taxonomy of sensor faults: noise, bias, drift, stuck and delayed values.
+Sizes are multiples of the channel's standard deviation, or in its unit.
 """
 
 import re
@@ -22,7 +22,7 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True)
 class _Fault:
-    """One fault: ``amount`` is standard deviations, seconds (delay) or None (stuck)."""
+    """One fault: ``amount`` is a size (``Faults.sizes_in``), seconds (delay) or None (stuck)."""
 
     kind: str
     channel: str
@@ -82,11 +82,11 @@ def inject_faults(
 
 def _faults(faults: Faults) -> Iterator[_Fault]:
     for kind in faults.kinds:
-        amounts: list[float | None] = [*faults.sizes]
-        if kind == "stuck":
-            amounts = [None]
-        elif kind == "delay":
+        amounts: list[float | None] = [None]
+        if kind == "delay":
             amounts = [*faults.delays_s]
+        elif kind != "stuck":
+            amounts = [*faults.sizes[kind]]
         for channel in faults.channels:
             for amount in amounts:
                 yield _Fault(kind, channel, amount)
@@ -103,9 +103,9 @@ def _check_slugs(faults: Sequence[_Fault]) -> None:
 
 
 def _check_fit(recordings: Sequence[Recording], faults: Faults, rate_hz: float) -> None:
-    if faults.duration_s * rate_hz < 1:
+    if faults.duration_s.low * rate_hz < 1:
         raise OdisarError(
-            f"faults.duration_s={faults.duration_s:g} is shorter than one sample at "
+            f"faults.duration_s.low={faults.duration_s.low:g} is shorter than one sample at "
             f"rate_hz={rate_hz:g}: raise it"
         )
     longest_s = max(faults.delays_s, default=0.0) if "delay" in faults.kinds else 0.0
@@ -120,10 +120,12 @@ def _check_fit(recordings: Sequence[Recording], faults: Faults, rate_hz: float) 
         if not len(_onsets(item, faults, rate_hz))
     ]
     if short:
+        needed_s = faults.start_s + faults.duration_s.high
         raise OdisarError(
-            f"faults need {faults.start_s + faults.duration_s:g} s (start_s + duration_s) with "
-            f"duration_s free of gaps, which these recordings lack: {', '.join(short)}. Lower "
-            "start_s or duration_s, or lengthen the recordings (splits.block_s for blocks)"
+            f"faults need {needed_s:g} s (start_s + duration_s.high), the last "
+            f"{faults.duration_s.high:g} free of gaps, which these recordings lack: "
+            f"{', '.join(short)}. Lower start_s or duration_s, or lengthen the recordings "
+            "(splits.block_s for blocks)"
         )
 
 
@@ -133,7 +135,7 @@ def _onsets(recording: Recording, faults: Faults, rate_hz: float) -> NDArray[np.
     earliest_s = time_s[0] + faults.start_s - _ROUNDING_S
     onsets = [np.empty(0, dtype=np.int64)]
     for start, stop in recording.segments:
-        latest_s = time_s[stop - 1] + 1.0 / rate_hz - faults.duration_s + _ROUNDING_S
+        latest_s = time_s[stop - 1] + 1.0 / rate_hz - faults.duration_s.high + _ROUNDING_S
         inside = time_s[start:stop]
         onsets.append(start + np.flatnonzero((inside >= earliest_s) & (inside <= latest_s)))
     return np.concatenate(onsets)
@@ -150,12 +152,13 @@ def _faulty_copy(
     name = f"{recording.name}-{fault.slug}"
     random = generator(base_seed, "faults", name)
     start_s = float(recording.time_s[random.choice(_onsets(recording, where, case.rate_hz))])
-    interval = Interval(start_s, start_s + where.duration_s, fault.kind)
+    interval = Interval(start_s, start_s + _duration_s(where, random), fault.kind)
     column = case.channel_names.index(fault.channel)
     inside = label_times(recording.time_s, [interval])
     values = recording.values.copy()
     std = float(channel_std[column])
-    values[inside, column] = _faulty_values(fault, recording, inside, column, std, random)
+    unit = std if where.sizes_in == "sd" else 1.0
+    values[inside, column] = _faulty_values(fault, recording, inside, column, unit, random)
     deviation = np.abs(values[inside, column] - recording.values[inside, column]).max() / std
     return replace(
         recording,
@@ -166,15 +169,34 @@ def _faulty_copy(
             components="all",
             strength=None,
             base_seed=recording.info.base_seed or recording.name,
-            extra=_extra(recording.info.extra, fault, shows=deviation >= where.shows_from_sd),
+            extra=_extra(
+                recording.info.extra,
+                fault,
+                _size_unit(fault, where, case),
+                shows=deviation >= where.shows_from_sd,
+            ),
         ),
         values=values,
         intervals=(interval,),
     )
 
 
-def _extra(extra: Mapping[str, str], fault: _Fault, *, shows: bool) -> dict[str, str]:
-    unit = "s" if fault.kind == "delay" else "sd"
+def _duration_s(faults: Faults, random: np.random.Generator) -> float:
+    length = faults.duration_s
+    return (
+        length.low if length.low == length.high else float(random.uniform(length.low, length.high))
+    )
+
+
+def _size_unit(fault: _Fault, faults: Faults, case: Case) -> str:
+    if fault.kind == "delay":
+        return "s"
+    if faults.sizes_in == "sd":
+        return "sd"
+    return case.channels[case.channel_names.index(fault.channel)].unit
+
+
+def _extra(extra: Mapping[str, str], fault: _Fault, unit: str, *, shows: bool) -> dict[str, str]:
     size = "" if fault.amount is None else f"{fault.amount:g} {unit}"
     return {
         **extra,
@@ -189,13 +211,16 @@ def _faulty_values(
     recording: Recording,
     inside: NDArray[np.bool_],
     column: int,
-    std: float,
+    unit: float,
     random: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Return what the sensor shows instead, at the samples ``inside`` (sample,) the interval."""
+    """Return what the sensor shows instead, at the samples ``inside`` (sample,) the interval.
+
+    ``unit`` is what an amount of 1 means in the channel's unit.
+    """
     truth = recording.values[:, column]
     time_s = recording.time_s
-    size = 0.0 if fault.amount is None else fault.amount * std
+    size = 0.0 if fault.amount is None else fault.amount * unit
     samples = int(inside.sum())
     if fault.kind == "noise":
         return truth[inside] + random.normal(0.0, size, samples)

@@ -63,7 +63,7 @@ def _rows_by_name(table: TextTable, names: Sequence[str], notes: Notes) -> dict[
             first = rows[name].line
             note("the recording has two rows", f"keep this or row {first}")
         elif name not in files:
-            note("the row has no file", f"add {name}.csv, or remove the row")
+            note("the row has no file", f"add a recording called {name}, or remove the row")
         else:
             rows[name] = row
     for name in names:
@@ -168,6 +168,7 @@ def describe(
         info = replace(recording.info, disturbance=intervals[0].label, components="all")
         return replace(labelled, info=info)
     info = index.infos.get(recording.name, recording.info)
+    info = replace(info, extra={**recording.info.extra, **info.extra})
     line = index.lines.get(recording.name)
     error = partial(notes.error, column="disturbance", row=line, value=recording.name)
     warning = partial(notes.warning, column="disturbance", row=line, value=recording.name)

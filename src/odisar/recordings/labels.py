@@ -33,7 +33,7 @@ def read_labels(
         if name not in files:
             notes.error(
                 "labels for an unknown recording",
-                f"add {name}.csv, or remove the line",
+                f"add a recording called {name}, or remove the line",
                 column="recording",
                 row=row.line,
                 value=name,

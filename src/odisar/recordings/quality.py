@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -177,9 +177,15 @@ def _aligned(findings: Iterable[Finding]) -> str:
     )
 
 
-def quality_table(findings: Sequence[Finding], recordings: Sequence[Recording]) -> pd.DataFrame:
+def quality_table(
+    findings: Sequence[Finding],
+    recordings: Sequence[Recording],
+    files: Mapping[str, str] | None = None,
+) -> pd.DataFrame:
     """Return a table of ``QUALITY_COLUMNS``: every recording read, and every file with a finding.
 
+    ``files`` are the names of the files by recording; without them, the files named in findings
+    are told by their stems and all others are taken for CSV files.
     ``seconds`` leaves the gaps out. A file with an error has no recording and so no samples.
 
     Raises
@@ -193,12 +199,13 @@ def quality_table(findings: Sequence[Finding], recordings: Sequence[Recording]) 
     by_file: dict[str, list[Finding]] = {}
     for finding in findings:
         by_file.setdefault(finding.file, []).append(finding)
-    named = {Path(file).stem for file in by_file}
-    for name in by_name:
-        if name not in named:
-            by_file[f"{name}.csv"] = []
+    if files is None:
+        files = {Path(file).stem: Path(file).name for file in by_file}
+    owners = {files.get(name, f"{name}.csv"): name for name in by_name}
+    named = {Path(file).name for file in by_file}
+    by_file |= {file: [] for file in owners if file not in named}
     rows = [
-        _quality_row(file, found, by_name.get(Path(file).stem))
+        _quality_row(file, found, by_name.get(owners.get(Path(file).name, "")))
         for file, found in sorted(by_file.items(), key=lambda item: Path(item[0]).name)
     ]
     return pd.DataFrame(rows, columns=list(QUALITY_COLUMNS))

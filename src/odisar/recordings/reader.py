@@ -1,48 +1,60 @@
 """Read a case's folder of recordings: every file is checked before anything is raised."""
 
-import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from odisar.config.cases import Case
-from odisar.recordings.checks import check_columns
-from odisar.recordings.csv_reader import read_columns
-from odisar.recordings.csv_text import read_text
+from odisar.recordings.bag_reader import read_bag
+from odisar.recordings.checks import check_table
+from odisar.recordings.csv_reader import read_csv
+from odisar.recordings.folder import (
+    INDEX_FILE,
+    LABELS_FILE,
+    Format,
+    format_of,
+    list_recordings,
+    recording_name,
+)
 from odisar.recordings.index import Index, default_info, describe, read_index
 from odisar.recordings.labels import read_labels
+from odisar.recordings.parquet_reader import read_parquet
 from odisar.recordings.quality import Finding, Notes
+from odisar.recordings.resampling import hold_segments
 from odisar.recordings.schema import Interval, Recording
+from odisar.recordings.table import Table
 
-INDEX_FILE = "recordings.csv"
-LABELS_FILE = "labels.csv"
+#: Metadata column for when a recording started, where its file has a clock.
+STARTED_AT = "started_at"
 
-_TABLES = frozenset({INDEX_FILE, LABELS_FILE})
-
-# Recordings in these formats are worth a word when they lie beside the CSV files, unread.
-_OTHER_FORMATS = frozenset({
-    ".bag", ".db3", ".feather", ".gz", ".h5", ".json", ".mat", ".mcap", ".npy", ".npz",
-    ".parquet", ".tsv", ".txt", ".xls", ".xlsx", ".zip",
-})  # fmt: skip
+_READERS: Mapping[Format, Callable[[Path, Case, Notes], Table | None]] = {
+    "csv": read_csv,
+    "parquet": read_parquet,
+    "bag": read_bag,
+}
 
 
 @dataclass(frozen=True)
 class ReadResult:
-    """The recordings of the files without an error, by name, and everything found on the way."""
+    """The recordings of the files without an error, by name, and everything found on the way.
+
+    ``files`` are the names of the files by that of their recordings.
+    """
 
     recordings: list[Recording] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_case(case_name: str, case: Case, root: Path) -> ReadResult:
     """Read and check every recording of a case.
 
-    Each CSV file in ``root / case.source.folder`` is a recording named by its stem, but for
-    ``recordings.csv`` (metadata) and ``labels.csv`` (labelled intervals), which may be missing.
-    Nothing is filled, resampled or left out in silence. The values are (sample, channel) in the
-    order of ``case.channels``.
+    Each CSV file, Parquet file and ROS 2 bag in ``root / case.source.folder`` is a recording named
+    by its stem (a bag by its folder), but for ``recordings.csv`` (metadata) and ``labels.csv``
+    (labelled intervals), which may be missing. Nothing is filled, resampled or left out in
+    silence. The values are (sample, channel) in the order of ``case.channels``.
 
     Pass the findings to ``raise_on_errors``: this function raises nothing, so that a report can
     show what was found.
@@ -50,7 +62,7 @@ def read_case(case_name: str, case: Case, root: Path) -> ReadResult:
     shown = Path(case.source.folder)
     folder = root / shown
     folder_notes = Notes(shown.as_posix())
-    paths = _list_files(folder, case, folder_notes)
+    paths = list_recordings(folder, case, folder_notes)
     all_notes = [folder_notes]
     read: dict[str, Recording] = {}
     for path in paths:
@@ -59,7 +71,8 @@ def read_case(case_name: str, case: Case, root: Path) -> ReadResult:
         recording = _read_recording(path, case_name, case, notes)
         if recording is not None:
             read[recording.name] = recording
-    names = [path.stem for path in paths]
+    files = {recording_name(path): path.name for path in paths}
+    names = list(files)
     index_notes = Notes((shown / INDEX_FILE).as_posix())
     labels_notes = Notes((shown / LABELS_FILE).as_posix())
     index = _index(folder / INDEX_FILE, case_name, case, names, index_notes)
@@ -69,80 +82,27 @@ def read_case(case_name: str, case: Case, root: Path) -> ReadResult:
         describe(recording, index, intervals.get(name, ()), index_notes)
         for name, recording in read.items()
     ]
-    return ReadResult(recordings, [finding for notes in all_notes for finding in notes.findings])
-
-
-def _list_files(folder: Path, case: Case, notes: Notes) -> list[Path]:
-    """Return the recordings' files, in the order of their names."""
-    if not folder.is_dir():
-        notes.error(
-            "the folder of recordings does not exist" if not folder.exists() else "not a folder",
-            "create it, or change source.folder of the case",
-        )
-        return []
-    try:
-        entries = sorted(folder.iterdir(), key=lambda path: path.name)
-    except OSError as fault:
-        notes.error("the folder cannot be read", "check that you may read it", value=fault.strerror)
-        return []
-    paths = [path for path in entries if _holds_table(path) and path.name not in _TABLES]
-    for path in entries:
-        if not _holds_table(path) and _may_hold_recordings(path):
-            notes.warning("not a CSV file: it is not read", "export it as CSV", value=path.name)
-    if not paths:
-        notes.error("the folder holds no recording", "put one CSV file a recording into it")
-    if len(paths) > case.source.max_recordings:
-        notes.error(
-            f"more recordings than source.max_recordings={case.source.max_recordings}",
-            "remove some, or raise the limit if memory allows",
-            value=f"{len(paths)} files",
-        )
-    return _without_twins(paths, notes)
-
-
-def _holds_table(path: Path) -> bool:
-    return path.suffix.lower() == ".csv" and not path.name.startswith(".")
-
-
-def _may_hold_recordings(path: Path) -> bool:
-    if path.name.startswith("."):
-        return path.suffix.lower() == ".csv"
-    if path.suffix.lower() in _OTHER_FORMATS:
-        return True
-    return path.is_dir() and os.access(path, os.R_OK) and any(path.glob("*.csv"))
-
-
-def _without_twins(paths: Sequence[Path], notes: Notes) -> list[Path]:
-    """Return the paths, without those whose name differs from another only after the stem."""
-    unique: dict[str, Path] = {}
-    for path in paths:
-        if path.stem in unique:
-            notes.error(
-                f"two files are named {path.stem!r}: only {unique[path.stem].name} was checked",
-                "rename one of them",
-                value=path.name,
-            )
-        unique.setdefault(path.stem, path)
-    return list(unique.values())
+    findings = [finding for notes in all_notes for finding in notes.findings]
+    return ReadResult(recordings, findings, files)
 
 
 def _read_recording(path: Path, case_name: str, case: Case, notes: Notes) -> Recording | None:
     """Return the recording in a file, not yet described, or None with the reasons in ``notes``."""
-    text = read_text(path, notes)
-    if text is None:
+    table = _READERS[format_of(path)](path, case, notes)
+    if table is None:
         return None
-    columns = read_columns(text, [case.source.time_column, *case.channel_names], notes)
-    if columns is None:
-        return None
-    segments = check_columns(columns, case, notes)
+    segments = check_table(table, case, notes)
     if notes.has_errors:
         return None
+    time_s = np.ascontiguousarray(table.values[:, 0])
+    values = np.ascontiguousarray(table.values[:, 1:])
+    if case.source.resample == "hold":
+        time_s, values, segments = hold_segments(time_s, values, segments, case.rate_hz)
+    info = default_info(case_name, case)
+    if table.started_at:
+        info = replace(info, extra={STARTED_AT: table.started_at})
     return Recording(
-        name=path.stem,
-        info=default_info(case_name, case),
-        time_s=np.ascontiguousarray(columns.values[:, 0]),
-        values=np.ascontiguousarray(columns.values[:, 1:]),
-        segments=segments,
+        name=recording_name(path), info=info, time_s=time_s, values=values, segments=segments
     )
 
 

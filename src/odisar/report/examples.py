@@ -19,6 +19,8 @@ from odisar.evaluation.labels import merge_events
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from odisar.twin.mc_dropout import draw_forecasts
+from odisar.windows.targets import recorded_states
+from odisar.windows.window_set import model_inputs, scaled_features
 
 #: Quantiles of the Monte Carlo draws between which the band of a forecast lies.
 BAND = (0.05, 0.95)
@@ -119,17 +121,18 @@ def forecasts_table(setup: str, twin: TrainedTwin, recording: Recording) -> pd.D
     """
     positions = _issue_positions(twin, recording)
     output = Scorer(twin, _BATCH, "cpu").forecast(recording, positions)
-    context, known = _inputs(twin, recording, positions)
-    drawn = draw_forecasts(twin.network, twin.masks, context, known).forecast.numpy()
-    low, high = np.quantile(drawn, BAND, axis=0)
+    samples = scaled_features([recording], twin.scaler, twin.spec)
+    inputs = model_inputs(samples, positions, twin.spec, len(twin.channel_names))
+    drawn = draw_forecasts(twin.network, twin.masks, *inputs).forecast
+    low, high = np.quantile(_physical(drawn, twin, recording, positions), BAND, axis=0)
     steps = np.arange(1, twin.spec.horizon_steps + 1)
     at = positions[:, None] + steps
     outputs = list(twin.spec.outputs)
     columns = {
-        "forecast": twin.scaler.unscale(output.forecast.numpy(), outputs),
-        "reconstruction": twin.scaler.unscale(output.reconstruction.numpy(), outputs),
-        "low": twin.scaler.unscale(low, outputs),
-        "high": twin.scaler.unscale(high, outputs),
+        "forecast": _physical(output.forecast, twin, recording, positions),
+        "reconstruction": _physical(output.reconstruction, twin, recording, positions),
+        "low": low,
+        "high": high,
         "truth": recording.values[at][..., outputs],
     }
     shape = columns["truth"].shape
@@ -189,7 +192,7 @@ def _is_overall(recording: Recording, case: Case) -> bool:
 def _force(recording: Recording) -> tuple[float, float]:
     """Order disturbed recordings by strength, and by the size of a fault where it has one."""
     size, _, unit = recording.info.column("fault_size").partition(" ")
-    return recording.info.strength or 0.0, float(size) if unit == "sd" else 0.0
+    return recording.info.strength or 0.0, float(size) if unit and unit != "s" else 0.0
 
 
 def _likeness(clean: Recording, disturbed: Recording) -> int:
@@ -199,9 +202,9 @@ def _likeness(clean: Recording, disturbed: Recording) -> int:
 
 def _issue_positions(twin: TrainedTwin, recording: Recording) -> NDArray[np.int64]:
     """Return up to three positions with a full context behind and a full horizon ahead."""
-    context, horizon = twin.spec.context_steps, twin.spec.horizon_steps
+    horizon = twin.spec.horizon_steps
     possible = np.concatenate(
-        [np.arange(a + context - 1, b - horizon) for a, b in recording.segments]
+        [twin.spec.issue_positions(segment, 1) for segment in recording.segments]
     )
     events = _events(recording)
     onset_s, end_s = events[0] if events else (recording.time_s[-1] / 2,) * 2
@@ -216,11 +219,9 @@ def _issue_positions(twin: TrainedTwin, recording: Recording) -> NDArray[np.int6
     return np.unique(np.array(nearest, dtype=np.int64))
 
 
-def _inputs(
-    twin: TrainedTwin, recording: Recording, positions: NDArray[np.int64]
-) -> tuple[torch.Tensor, torch.Tensor]:
-    samples = torch.from_numpy(twin.scaler.scale(recording.values))
-    back = torch.arange(1 - twin.spec.context_steps, 1)
-    ahead = torch.arange(1, twin.spec.horizon_steps + 1)
-    at = torch.from_numpy(positions)[:, None]
-    return samples[at + back], samples[at + ahead][..., list(twin.spec.known_ahead)]
+def _physical(
+    scaled: torch.Tensor, twin: TrainedTwin, recording: Recording, positions: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return (..., window, step, state) in physical units and the recording's coordinates."""
+    targets = twin.scaler.unscale_targets(scaled.numpy())
+    return recorded_states(targets, recording, positions, twin.spec)

@@ -153,12 +153,11 @@ def quality(results: Results) -> Table:
     return Table("Quality of the recordings", heads, lines)
 
 
-def plausibility(table: pd.DataFrame) -> Table:
-    """Return what the simulated ferry does beside what a ship of its kind does."""
+def plausibility(title: str, table: pd.DataFrame, note: str) -> Table:
+    """Return what a simulated machine does beside what machines of its kind do."""
     lines = [
         [
             row.quantity,
-            "" if pd.isna(row.angle_deg) else f"{row.angle_deg:.0f}",
             number(row.value),
             "" if str(row.unit) == "1" else str(row.unit),
             f"{number(row.low)} to {number(row.high)}",
@@ -166,12 +165,8 @@ def plausibility(table: pd.DataFrame) -> Table:
         ]
         for row in rows_of(table)
     ]
-    heads = ["quantity", "angle [deg]", "simulated", "unit", "plausible range", "inside"]
-    note = (
-        "Turning circles and zigzags after IMO MSC.137(76), with the thruster angle in the place "
-        "of the rudder angle, and the largest roll in any manoeuvre at strength 1."
-    )
-    return Table("Plausibility of the simulated ferry", heads, lines, note)
+    heads = ["quantity", "simulated", "unit", "plausible range", "inside"]
+    return Table(title, heads, lines, note)
 
 
 def sea_trial(table: pd.DataFrame) -> Table:

@@ -46,7 +46,7 @@ def render_body(
     results: Results,
     figures: Sequence[Drawn],
     notebooks: Sequence[Path],
-    plausibility: Table | None,
+    plausibility: Sequence[Table],
 ) -> str:
     """Return everything of the report that follows from results alone, as an HTML fragment."""
     setups = results.setups

@@ -11,8 +11,10 @@ from odisar.recordings.schema import Recording
 from odisar.recordings.splits import assign_splits
 from odisar.recordings.store import read_store
 from odisar.seeding import derive_seed
-from odisar.windows.scaling import Scaler
-from odisar.windows.windowing import WindowSet, WindowSpec
+from odisar.windows.coordinates import pose_channels
+from odisar.windows.scaling import Scaler, channel_std
+from odisar.windows.window_set import WindowSet
+from odisar.windows.windowing import WindowSpec
 
 
 @dataclass(frozen=True)
@@ -66,17 +68,18 @@ def load_member(config: ConfigView, workspace: Workspace, member: Member) -> Mem
     splits = assign_splits(
         recordings, case, setup.select, member.fold, derive_seed(config.seed, "splits", setup.case)
     )
-    scaler = Scaler.fit(splits["train"])
     if case.faults is not None:
         seed = derive_seed(config.seed, "faults", setup.case)
-        splits["test"] = splits["test"] + inject_faults(splits["test"], case, scaler.std, seed)
+        std = channel_std(splits["train"])
+        splits["test"] = splits["test"] + inject_faults(splits["test"], case, std, seed)
     spec = WindowSpec(
         case.window.context_steps,
         case.window.horizon_steps,
         tuple(case.output_indices),
         tuple(case.known_ahead_indices),
+        pose_channels(case),
     )
-    return MemberData(case, splits, scaler, spec)
+    return MemberData(case, splits, Scaler.fit(splits["train"], spec), spec)
 
 
 def hours(recordings: Sequence[Recording], case: Case) -> float:

@@ -32,12 +32,13 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     recordings: dict[str, list[Recording]] = {}
     tables: list[pd.DataFrame] = []
     for name in config.active_cases:
-        if config.cases[name].source.maker == "ferry-simulator":
-            check_recipe(workspace.root, name, config.simulators.recipe())
+        check_recipe(workspace.root, name, config.recipe_of(name))
         result = read_case(name, config.cases[name], workspace.root)
         findings.extend(result.findings)
         recordings[name] = result.recordings
-        tables.append(quality_table(result.findings, result.recordings).assign(case=name))
+        tables.append(
+            quality_table(result.findings, result.recordings, result.files).assign(case=name)
+        )
     raise_on_errors(findings)
     quality = pd.concat(tables, ignore_index=True)
     for name, group in recordings.items():

@@ -5,15 +5,18 @@ what it is made from is.
 """
 
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from odisar.artifacts import Workspace, read_json, write_json
 from odisar.config.loader import ConfigView, load_config
+from odisar.deployment.development import DevelopmentScore
 from odisar.errors import OdisarError
 from odisar.report.load import report_folder
 from odisar.report.page import RunFacts, page_content, render_page
 from odisar.report.simulator_checks import show_sea_trial
+from odisar.stages.bundle import measure_again
 from odisar.stages.runner import STAGES, plain, run_stage
 from odisar.tracking import (
     FINISHED,
@@ -25,6 +28,7 @@ from odisar.tracking import (
     flatten,
     git_revision,
 )
+from odisar.tracking.registry import register
 
 PARAMS = (
     "seed",
@@ -38,6 +42,7 @@ PARAMS = (
     "capability",
     "evaluation",
     "tracking",
+    "registry",
     "report",
     "simulators",
     "sources",
@@ -57,7 +62,23 @@ def run(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
     parent.artifact(workspace.results, "results")
     parent.artifact(workspace.figures, "figures")
     parent.artifact(workspace.report)
+    register_bundles(config, workspace, parent)
     _mark(parent, workspace)
+
+
+def register_bundles(config: ConfigView, workspace: Workspace, parent: TrackedRun) -> None:
+    """Register every set-up's bundle, once for this content, and print what came out."""
+    scores = read_json(workspace.development)
+    for setup in config.pipeline.setups:
+        registration = register(
+            workspace.root,
+            parent,
+            workspace.bundle(setup),
+            DevelopmentScore(**scores[setup]),
+            config.registry.champion,
+            partial(measure_again, config, workspace, setup),
+        )
+        print(registration.line)  # noqa: T201
 
 
 def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
@@ -68,7 +89,7 @@ def write_report(config: ConfigView, workspace: Workspace, tracker: Tracker) -> 
     facts = run_facts(config, workspace, tracker)
     body = path.read_text(encoding="utf-8")
     trial = None
-    if config.simulates_the_ferry:
+    if "vessel" in config.active_simulators:
         picture = workspace.root / "build/sea-trial.png"
         trial = show_sea_trial(config.sources.gunnerus.file, workspace.root, picture)
     page = render_page(config.report.title, body, facts, flatten(configured(config)), trial)

@@ -17,14 +17,11 @@ from odisar.report.examples import (
     traces_table,
     write_examples,
 )
-from odisar.report.figures.simulator import standard_trials
-from odisar.report.gallery import Drawn, draw_figures
+from odisar.report.gallery import draw_figures
 from odisar.report.load import Results, report_folder
 from odisar.report.notebooks import execute_notebooks
-from odisar.report.overview import plausibility
 from odisar.report.page import render_body
-from odisar.report.style import save_figure
-from odisar.simulators.vessel.plausibility import plausibility_table, trial_traces
+from odisar.report.simulator_checks import check_simulator
 from odisar.stages.members import load_member, pipeline_members
 from odisar.tracking import TrackedRun
 from odisar.twin.bundle import read_twin
@@ -54,12 +51,11 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
     with ThreadPoolExecutor(1) as pool:
         executing = pool.submit(execute_notebooks, workspace.root, folder / "notebooks")
         figures = draw_figures(results, workspace.figures)
-        plausible = None
-        if config.simulates_the_ferry:
-            figures.append(_draw_trials(config, workspace))
-            plausible = plausibility(
-                plausibility_table(config.simulators.vessel, config.simulators.seed)
-            )
+        plausible = []
+        for simulator in config.active_simulators:
+            table, drawn = check_simulator(simulator, config.simulators, workspace.figures)
+            plausible.append(table)
+            figures.append(drawn)
         notebooks = executing.result()
     body = render_body(results, figures, notebooks, plausible)
     (folder / "body.html").write_text(body, encoding="utf-8")
@@ -106,10 +102,3 @@ def _member_of(tested: Sequence[Tested], setup: str, recording: str) -> str:
     return next(
         one.member for one in tested if one.setup == setup and one.recording.name == recording
     )
-
-
-def _draw_trials(config: ConfigView, workspace: Workspace) -> Drawn:
-    path = workspace.figures / "standard-trials.png"
-    save_figure(standard_trials(trial_traces(config.simulators.vessel)), path)
-    caption = "The simulated ferry in calm water: turning circles and zigzags at four angles."
-    return Drawn("simulator", "", caption, path)

@@ -9,7 +9,7 @@ from odisar.config.loader import ConfigView, load_config
 from odisar.tracking import Tracker
 
 #: In the order of ``dvc.yaml``.
-STAGES = ("preprocess", "tune", "train", "calibrate", "evaluate", "report", "publish")
+STAGES = ("preprocess", "tune", "train", "calibrate", "evaluate", "bundle", "report", "publish")
 
 # NumPy's threads would compete with the processes that share the cores.
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

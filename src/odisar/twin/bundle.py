@@ -13,6 +13,7 @@ from safetensors.torch import load_file, save_file
 from odisar.config.learning import TwinConfig
 from odisar.errors import OdisarError
 from odisar.twin.transformer import TwinTransformer
+from odisar.windows.coordinates import PoseChannels
 from odisar.windows.scaling import Scaler
 from odisar.windows.windowing import WindowSpec
 
@@ -45,7 +46,7 @@ def write_twin(folder: Path, twin: TrainedTwin) -> None:
         "channel_names": twin.channel_names,
         "config": twin.config.model_dump(),
         "spec": asdict(twin.spec),
-        "scaler": {"mean": twin.scaler.mean.tolist(), "std": twin.scaler.std.tolist()},
+        "scaler": {name: values.tolist() for name, values in vars(twin.scaler).items()},
     }
     text = json.dumps(description, indent=2, sort_keys=True)
     (folder / _DESCRIPTION).write_text(text + "\n", encoding="utf-8")
@@ -58,21 +59,23 @@ def read_twin(folder: Path) -> TrainedTwin:
         config = TwinConfig.model_validate(description["config"])
         spec = _read_spec(description["spec"])
         channel_names = tuple(description["channel_names"])
-        network = TwinTransformer(config, spec, len(channel_names))
+        network = TwinTransformer(config, spec, spec.feature_count(len(channel_names)))
         network.load_state_dict(load_file(folder / _WEIGHTS))
         masks = load_file(folder / _MASKS)
-    except (OSError, ValueError, KeyError, RuntimeError, SafetensorError) as error:
+        scaler = Scaler(**{k: np.array(v) for k, v in description["scaler"].items()})
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, SafetensorError) as error:
         raise OdisarError(
             f"{folder}: not a trained twin ({' '.join(str(error).split())}); run the train stage"
         ) from error
-    scaler = Scaler(np.array(description["scaler"]["mean"]), np.array(description["scaler"]["std"]))
     return TrainedTwin(network.eval(), config, spec, scaler, masks, channel_names)
 
 
 def _read_spec(values: dict[str, Any]) -> WindowSpec:
+    pose = values["pose"]
     return WindowSpec(
         context_steps=values["context_steps"],
         horizon_steps=values["horizon_steps"],
         outputs=tuple(values["outputs"]),
         known_ahead=tuple(values["known_ahead"]),
+        pose=None if pose is None else PoseChannels(**pose | {"heading": tuple(pose["heading"])}),
     )

@@ -20,11 +20,11 @@ class TwinModule(L.LightningModule):
     """
 
     def __init__(
-        self, config: TwinConfig, spec: WindowSpec, channels: int, learning_rate: float, seed: int
+        self, config: TwinConfig, spec: WindowSpec, features: int, learning_rate: float, seed: int
     ) -> None:
         super().__init__()
         torch.manual_seed(derive_seed(seed, "weights"))
-        self.network = TwinTransformer(config, spec, channels)
+        self.network = TwinTransformer(config, spec, features)
         self._detach = config.detach_reconstruction
         self._learning_rate = learning_rate
         self._seed = seed

@@ -16,7 +16,7 @@ from odisar.twin.lightning_module import VALIDATION_METRIC, TwinModule
 from odisar.twin.progress import EpochHistory
 from odisar.twin.transformer import TwinTransformer
 from odisar.windows.datamodule import WindowDataModule
-from odisar.windows.windowing import WindowSet
+from odisar.windows.window_set import WindowSet
 
 #: Windows a validation batch holds; a matter of memory, not of results.
 _VALIDATION_BATCH = 256
@@ -48,11 +48,11 @@ class TrainingResult:
 
 def build_module(plan: TrainingPlan, windows: WindowSet) -> TwinModule:
     """Return a fresh module whose weights depend on the plan's seed alone."""
-    channels = windows.samples.shape[1]
+    features = windows.samples.shape[1]
     return TwinModule(
         plan.twin,
         windows.spec,
-        channels,
+        features,
         plan.training.learning_rate,
         derive_seed(plan.seed, "twin"),
     )

@@ -27,7 +27,7 @@ class TwinOutput:
 class TwinTransformer(nn.Module):
     """Encoder over the context, decoder over the horizon, two heads on the decoder's output."""
 
-    def __init__(self, config: TwinConfig, spec: WindowSpec, channels: int) -> None:
+    def __init__(self, config: TwinConfig, spec: WindowSpec, features: int) -> None:
         super().__init__()
         self.spec = spec
         self.patch_steps = config.patch_steps
@@ -36,7 +36,7 @@ class TwinTransformer(nn.Module):
         width, states = config.model_dim, len(spec.outputs)
         layer = (width, config.heads, config.feedforward_dim, config.dropout)
 
-        self.embed = nn.Linear(config.patch_steps * channels, width)
+        self.embed = nn.Linear(config.patch_steps * features, width)
         self.context_position = nn.Parameter(0.02 * torch.randn(context_tokens, width))
         self.embed_dropout = Dropout(config.dropout, context_tokens, width)
         self.encoder = nn.ModuleList(
@@ -45,7 +45,7 @@ class TwinTransformer(nn.Module):
         self.memory_norm = nn.LayerNorm(width)
 
         self.query = nn.Parameter(0.02 * torch.randn(horizon_tokens, width))
-        self.embed_last = nn.Linear(channels, width)
+        self.embed_last = nn.Linear(features, width)
         self.embed_known = (
             nn.Linear(config.patch_steps * len(spec.known_ahead), width)
             if spec.known_ahead
@@ -63,7 +63,7 @@ class TwinTransformer(nn.Module):
         )
 
     def encode(self, context: torch.Tensor) -> torch.Tensor:
-        """Return memory (window, context token, feature) from context (window, step, channel)."""
+        """Return memory (window, context token, feature) from context (window, step, feature)."""
         x = self.embed_dropout(self.embed(self._patch(context)) + self.context_position)
         for layer in self.encoder:
             x = layer(x)
@@ -74,7 +74,7 @@ class TwinTransformer(nn.Module):
     ) -> TwinOutput:
         """Forecast and reconstruct the horizon.
 
-        ``memory`` (window, context token, feature), ``last`` (window, channel) the sample at t,
+        ``memory`` (window, context token, feature), ``last`` (window, feature) the sample at t,
         ``known_future`` (window, horizon step, command), empty unless commands are known ahead.
         """
         x = self.query + self.embed_last(last)[:, None]
@@ -88,11 +88,11 @@ class TwinTransformer(nn.Module):
         )
 
     def forward(self, context: torch.Tensor, known_future: torch.Tensor) -> TwinOutput:
-        """Run encoder and decoder on context (window, context step, channel), scaled."""
+        """Run encoder and decoder on context (window, context step, feature), scaled."""
         return self.decode(self.encode(context), context[:, -1], known_future)
 
     def _patch(self, steps: torch.Tensor) -> torch.Tensor:
-        """Return (window, token, patch step x channel) from (window, step, channel)."""
+        """Return (window, token, patch step x feature) from (window, step, feature)."""
         return steps.reshape(len(steps), -1, self.patch_steps * steps.shape[2])
 
     def _unpatch(self, patches: torch.Tensor) -> torch.Tensor:

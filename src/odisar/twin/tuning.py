@@ -22,7 +22,7 @@ from odisar.seeding import derive_seed
 from odisar.twin.lightning_module import VALIDATION_METRIC
 from odisar.twin.progress import EpochHistory
 from odisar.twin.training import TrainingPlan, build_data, build_module, build_trainer
-from odisar.windows.windowing import WindowSet
+from odisar.windows.window_set import WindowSet
 
 _FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 

@@ -8,7 +8,8 @@ import torch
 from torch.utils.data import DataLoader, Dataset, Sampler
 
 from odisar.seeding import derive_seed
-from odisar.windows.windowing import Batch, WindowSet
+from odisar.windows.window_set import WindowSet
+from odisar.windows.windowing import Batch
 
 
 class _WindowBatches(Dataset[Batch]):

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from sklearn.neighbors import NearestNeighbors
 
 from odisar.recordings.schema import Recording
+from odisar.windows.coordinates import features
 from odisar.windows.scaling import Scaler
-from odisar.windows.windowing import WindowSpec, issue_positions
+from odisar.windows.windowing import WindowSpec
 
 # A sixth of the context apart: near enough that a copy, shifted, would still be found.
 _STRIDE_SHARE = 6
@@ -20,7 +21,7 @@ def nearness_table(
 ) -> pd.DataFrame:
     """Return quantiles of the distance to the nearest training window, by split.
 
-    Distances are root mean squares over steps and channels of scaled contexts: a copy is at 0,
+    Distances are root mean squares over steps and features of scaled contexts: a copy is at 0,
     two unrelated windows at about 1.4. Only undisturbed recordings count.
     """
     train = _contexts(splits["train"], scaler, spec)
@@ -54,8 +55,8 @@ def _contexts(
     back = np.arange(1 - spec.context_steps, 1)
     parts = [np.empty((0, spec.context_steps * len(scaler.mean)), dtype=np.float32)]
     for recording in recordings:
-        scaled = scaler.scale(recording.values)
+        scaled = scaler.scale(features(recording, spec.pose))
         for segment in recording.segments:
-            positions = issue_positions(segment, spec.context_steps, 0, stride)
+            positions = spec.issue_positions(segment, stride, horizon_steps=0)
             parts.append(scaled[positions[:, None] + back].reshape(len(positions), -1))
     return np.concatenate(parts)

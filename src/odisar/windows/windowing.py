@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 
 from odisar.recordings.schema import Recording
-from odisar.windows.scaling import Scaler
+from odisar.windows.coordinates import POSE_RATES, PoseChannels
 
 
 @dataclass(frozen=True)
@@ -16,20 +16,45 @@ class WindowSpec:
     """Lengths of context and horizon in steps, and which channels stand where.
 
     ``outputs`` are the positions of the forecast states among the channels; ``known_ahead`` those
-    of the commands whose future the decoder may see.
+    of the commands whose future the decoder may see; ``pose`` is the pose that the twin sees in
+    relative coordinates, if any.
     """
 
     context_steps: int
     horizon_steps: int
     outputs: tuple[int, ...]
     known_ahead: tuple[int, ...]
+    pose: PoseChannels | None = None
+
+    @property
+    def unusable_steps(self) -> int:
+        """Samples at the start of a segment that no context can hold: they have no increment."""
+        return 0 if self.pose is None else 1
+
+    def feature_count(self, channels: int) -> int:
+        """Return how many features a sample of so many channels has."""
+        if self.pose is None:
+            return channels
+        return channels - len(self.pose.positions) + POSE_RATES
+
+    def issue_positions(
+        self, segment: tuple[int, int], stride_steps: int, *, horizon_steps: int | None = None
+    ) -> NDArray[np.int64]:
+        """Return the positions t in a segment that have their whole context and horizon inside it.
+
+        ``horizon_steps`` replaces the spec's own where less (or nothing) of the future is needed.
+        """
+        start, stop = segment
+        ahead = self.horizon_steps if horizon_steps is None else horizon_steps
+        first = start + self.unusable_steps + self.context_steps - 1
+        return np.arange(first, stop - ahead, stride_steps, dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class Batch:
     """What the twin gets, and the truth it is held against.
 
-    ``context`` (window, context step, channel), ``known_future`` (window, horizon step, command)
+    ``context`` (window, context step, feature), ``known_future`` (window, horizon step, command)
     and ``truth`` (window, horizon step, state), all scaled.
     """
 
@@ -38,62 +63,15 @@ class Batch:
     truth: torch.Tensor
 
 
-class WindowSet:
-    """All windows of some recordings, as issue positions in one (sample, channel) tensor.
-
-    A window is named by the position of its last context sample, the *issue position* t. Memory
-    grows with the samples, not with windows x steps: ``gather`` indexes a strided view.
-    """
-
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        scaler: Scaler,
-        spec: WindowSpec,
-        *,
-        stride_steps: int = 1,
-    ) -> None:
-        self.spec = spec
-        scaled = [scaler.scale(recording.values) for recording in recordings]
-        self.samples = torch.from_numpy(np.concatenate(scaled))
-        self.issues = torch.from_numpy(_issue_positions(recordings, spec, stride_steps))
-        length = spec.context_steps + spec.horizon_steps
-        self._view = self.samples.unfold(0, length, 1)  # (start, channel, step), no copy
-
-    def __len__(self) -> int:
-        """Return the number of windows."""
-        return len(self.issues)
-
-    def gather(self, windows: torch.Tensor) -> Batch:
-        """Return the windows at these positions of the index."""
-        spec = self.spec
-        starts = self.issues[windows] - (spec.context_steps - 1)
-        steps = self._view[starts].transpose(1, 2)
-        future = steps[:, spec.context_steps :]
-        return Batch(
-            context=steps[:, : spec.context_steps],
-            known_future=future[..., list(spec.known_ahead)],
-            truth=future[..., list(spec.outputs)],
-        )
-
-
-def issue_positions(
-    segment: tuple[int, int], context_steps: int, horizon_steps: int, stride_steps: int
-) -> NDArray[np.int64]:
-    """Return the positions t in a segment that have their whole context and horizon inside it."""
-    start, stop = segment
-    return np.arange(start + context_steps - 1, stop - horizon_steps, stride_steps, dtype=np.int64)
-
-
-def _issue_positions(
+def window_positions(
     recordings: Sequence[Recording], spec: WindowSpec, stride_steps: int
 ) -> NDArray[np.int64]:
+    """Return the issue positions of all windows, counted over the recordings joined together."""
     positions: list[NDArray[np.int64]] = [np.empty(0, dtype=np.int64)]
     offset = 0
     for recording in recordings:
         positions.extend(
-            offset + issue_positions(segment, spec.context_steps, spec.horizon_steps, stride_steps)
-            for segment in recording.segments
+            offset + spec.issue_positions(segment, stride_steps) for segment in recording.segments
         )
         offset += len(recording.time_s)
     return np.concatenate(positions)

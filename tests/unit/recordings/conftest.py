@@ -1,17 +1,38 @@
-"""A small case (two states, one command, 1 Hz) and a folder of good recordings to spoil."""
+"""A small case (two states, one command, 1 Hz) and a folder of good recordings to spoil.
 
-from collections.abc import Callable
+A recording can be written in each format; a bag has the boat's speed in /odom (a header), its
+heading in /joint_states (a header) and its rudder in /rudder (no header).
+"""
+
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 
 from odisar.config.cases import Case
 from odisar.recordings.quality import Finding
 from odisar.recordings.reader import ReadResult, read_case
 from odisar.recordings.schema import Recording, RecordingInfo
 
+STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite": StoragePlugin.SQLITE3}
+BAG_START_NS = 1_700_000_000_000_000_000
+BAG_LAYOUT: dict[str, Any] = {
+    "stamp_topic": "/odom",
+    "stamp": "header",
+    "max_age_s": 1.5,
+    "fields": {
+        "Rudder": "/rudder:data",
+        "Speed": "/odom:twist.twist.linear.x",
+        "Heading": "/joint_states:position[1]",
+    },
+}
+TYPES = get_typestore(Stores.ROS2_HUMBLE)
 HEADER = "time_s,Rudder,Speed,Heading\n"
 
 
@@ -34,6 +55,9 @@ def case_values() -> dict[str, Any]:
             "maker": "none",
             "time_column": "time_s",
             "max_recordings": 20,
+            "csv": {"separator": "comma", "decimal": "point"},
+            "bag": None,
+            "resample": "none",
         },
         "rate_hz": 1.0,
         "max_gap_s": 1.5,
@@ -42,6 +66,7 @@ def case_values() -> dict[str, Any]:
             channel("Speed", "m/s", "state", 15.0),
             channel("Heading", "rad", "state", 3.2),
         ],
+        "pose": None,
         "window": {"context_steps": 6, "horizon_steps": 4},
         "splits": {
             "kind": "fractions",
@@ -125,6 +150,159 @@ def make_boat(tmp_path: Path, make_case: Callable[..., Case]) -> Callable[..., B
 @pytest.fixture
 def boat(make_boat: Callable[..., Boat]) -> Boat:
     return make_boat()
+
+
+@pytest.fixture
+def bag_boat(make_boat: Callable[..., Boat]) -> Boat:
+    return make_boat(source={"bag": BAG_LAYOUT})
+
+
+@pytest.fixture
+def boat_with(make_boat: Callable[..., Boat]) -> Callable[..., Boat]:
+    """Build the boat with another layout of bags; fields given replace those of the channel."""
+
+    def make(fields: dict[str, str] | None = None, **layout: Any) -> Boat:
+        taken = BAG_LAYOUT["fields"] | (fields or {})
+        return make_boat(source={"bag": BAG_LAYOUT | layout | {"fields": taken}})
+
+    return make
+
+
+Message = tuple[str, str, int, Any]  # topic, type, time of arrival in ns, message
+
+
+class Ros:
+    """Makes ROS 2 messages and bags; times are in seconds after ``BAG_START_NS``."""
+
+    @staticmethod
+    def types() -> Any:
+        return TYPES
+
+    @staticmethod
+    def ns(time_s: float) -> int:
+        return BAG_START_NS + round(time_s * 1e9)
+
+    @staticmethod
+    def header(stamp_ns: int) -> Any:
+        stamp = TYPES.types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9))
+        return TYPES.types["std_msgs/msg/Header"](stamp, "base")
+
+    @staticmethod
+    def odometry(
+        time_s: float, speed: float, stamp_ns: int | None = None, arrival_s: float | None = None
+    ) -> Message:
+        kinds = TYPES.types
+        vector, zeros = kinds["geometry_msgs/msg/Vector3"], np.zeros(36)
+        twist = kinds["geometry_msgs/msg/Twist"](vector(speed, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+        pose = kinds["geometry_msgs/msg/Pose"](
+            kinds["geometry_msgs/msg/Point"](0.0, 0.0, 0.0),
+            kinds["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
+        )
+        message = kinds["nav_msgs/msg/Odometry"](
+            Ros.header(Ros.ns(time_s) if stamp_ns is None else stamp_ns),
+            "base",
+            kinds["geometry_msgs/msg/PoseWithCovariance"](pose, zeros),
+            kinds["geometry_msgs/msg/TwistWithCovariance"](twist, zeros),
+        )
+        arrival_ns = Ros.ns(time_s + 0.05 if arrival_s is None else arrival_s)
+        return "/odom", "nav_msgs/msg/Odometry", arrival_ns, message
+
+    @staticmethod
+    def joints(time_s: float, positions: Iterable[float]) -> Message:
+        empty = np.empty(0)
+        message = TYPES.types["sensor_msgs/msg/JointState"](
+            Ros.header(Ros.ns(time_s)), ["wheel", "rudder"], np.array(positions), empty, empty
+        )
+        return "/joint_states", "sensor_msgs/msg/JointState", Ros.ns(time_s + 0.02), message
+
+    @staticmethod
+    def rudder(time_s: float, angle: float) -> Message:
+        message = TYPES.types["std_msgs/msg/Float64"](angle)
+        return "/rudder", "std_msgs/msg/Float64", Ros.ns(time_s), message
+
+    @staticmethod
+    def boat(time_s: Iterable[float], columns: dict[str, Iterable[float]]) -> list[Message]:
+        """Return the messages of a recording; all topics speak shortly before each sample."""
+        messages, latest_s = [], 0.0
+        rows = zip(time_s, columns["Rudder"], columns["Speed"], columns["Heading"], strict=True)
+        for moment_s, rudder, speed, heading in rows:
+            messages.append(Ros.rudder(moment_s - 0.2, rudder))
+            messages.append(Ros.joints(moment_s - 0.1, [0.0, heading]))
+            # A header's clock may jump; the recorder's does not.
+            latest_s = max(latest_s + 1e-6, moment_s + 0.05)
+            messages.append(Ros.odometry(moment_s, speed, arrival_s=latest_s))
+        return messages
+
+    @staticmethod
+    def storage(name: str) -> StoragePlugin:
+        return STORAGES[name]
+
+    @staticmethod
+    def write(path: Path, messages: Iterable[Message], storage: str = "mcap") -> Path:
+        Ros.fill(Writer(path, version=9, storage_plugin=STORAGES[storage]), messages)
+        return path
+
+    @staticmethod
+    def fill(writer: Writer, messages: Iterable[Message]) -> None:
+        with writer:
+            connections: dict[str, Any] = {}
+            for topic, kind, arrival_ns, message in messages:
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=TYPES)
+                raw = message if isinstance(message, bytes) else TYPES.serialize_cdr(message, kind)
+                writer.write(connections[topic], arrival_ns, raw)
+
+
+@pytest.fixture
+def ros() -> type[Ros]:
+    return Ros
+
+
+@pytest.fixture(params=sorted(STORAGES))
+def storage(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+def good_columns(samples: int = 30) -> dict[str, Any]:
+    """Return the columns of a good recording, with all digits of a 64-bit float."""
+    i = np.arange(samples)
+    return {
+        "Rudder": 10 * np.sin(i),
+        "Speed": 5 + np.cos(i),
+        "Heading": 0.1 * np.sin(i / 3),
+    }
+
+
+@pytest.fixture
+def columns() -> dict[str, Any]:
+    return good_columns()
+
+
+@pytest.fixture
+def messages(columns: dict[str, Any]) -> list[Message]:
+    return Ros.boat(np.arange(30.0), columns)
+
+
+FORMATS = ("csv", "parquet", "mcap", "sqlite")
+
+
+@pytest.fixture(params=FORMATS)
+def write_format(request: pytest.FixtureRequest, bag_boat: Boat) -> Callable[..., Path]:
+    """Write a recording called ``a`` of times and columns, in each of the formats."""
+
+    def write(time_s: Any, columns: dict[str, Any], name: str = "a") -> Path:
+        path = bag_boat.folder / name
+        table = {"time_s": np.asarray(time_s, dtype=float), **columns}
+        if request.param == "csv":
+            rows = zip(*table.values(), strict=True)
+            lines = [",".join(map(repr, map(float, row))) for row in rows]
+            return bag_boat.write(f"{name}.csv", "\n".join([",".join(table), *lines, ""]))
+        if request.param == "parquet":
+            parquet.write_table(pa.table(table), path.with_suffix(".parquet"))
+            return path.with_suffix(".parquet")
+        return Ros.write(path, Ros.boat(time_s, columns), request.param)
+
+    return write
 
 
 @pytest.fixture

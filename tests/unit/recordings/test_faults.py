@@ -8,10 +8,11 @@ from odisar.recordings.schema import label_times
 FAULTS = {
     "kinds": ["noise", "bias", "drift", "stuck", "delay"],
     "channels": ["Speed"],
-    "sizes": [2.0],
+    "sizes": {"noise": [2.0], "bias": [2.0], "drift": [2.0]},
+    "sizes_in": "sd",
     "delays_s": [3.0],
     "start_s": 10.0,
-    "duration_s": 20.0,
+    "duration_s": {"low": 20.0, "high": 20.0},
     "shows_from_sd": 0.25,
 }
 STD = np.array([1.0, 0.5, 2.0])
@@ -76,6 +77,62 @@ def test_what_the_faulty_sensor_shows(copies):
     assert len(np.unique(values - truth[at])) == 20
 
 
+def test_sizes_in_the_channel_s_unit_take_no_account_of_its_spread(make_case, make_recording):
+    recording = make_recording("turn", 60)
+    case = make_case(faults=FAULTS | {"sizes_in": "unit"})
+    faulty = {copy.info.disturbance: copy for copy in inject_faults([recording], case, STD, 7)}
+    at = np.flatnonzero(label_times(recording.time_s, faulty["bias"].intervals))
+    np.testing.assert_allclose(faulty["bias"].values[at, 1] - recording.values[at, 1], 2.0)
+    at = np.flatnonzero(label_times(recording.time_s, faulty["drift"].intervals))
+    shown = faulty["drift"].values[at, 1] - recording.values[at, 1]
+    np.testing.assert_allclose(shown, np.linspace(0, 2, 20), atol=1e-12)
+    at = np.flatnonzero(label_times(recording.time_s, faulty["noise"].intervals))
+    assert 1.0 < np.std(faulty["noise"].values[at, 1] - recording.values[at, 1]) < 3.2
+    sizes = {kind: copy.info.column("fault_size") for kind, copy in faulty.items()}
+    assert sizes == {
+        "noise": "2 m/s",
+        "bias": "2 m/s",
+        "drift": "2 m/s",
+        "stuck": "",
+        "delay": "3 s",
+    }
+
+
+def test_whether_a_fault_shows_is_judged_in_standard_deviations(make_case, make_recording):
+    faults = FAULTS | {"kinds": ["bias"], "sizes_in": "unit", "shows_from_sd": 3.0}
+    for size, shows in ((1.4, "hidden"), (1.6, "shows")):
+        case = make_case(faults=faults | {"sizes": {"bias": [size]}})
+        (copy,) = inject_faults([make_recording("turn", 60)], case, STD, 7)
+        assert copy.info.column("fault_shows") == shows
+
+
+def test_kinds_have_sizes_of_their_own(make_case, make_recording):
+    sizes = {"noise": [1.0, 2.0], "bias": [3.0], "drift": [4.0]}
+    case = make_case(faults=FAULTS | {"kinds": ["noise", "bias", "drift"], "sizes": sizes})
+    faulty = inject_faults([make_recording("turn", 60)], case, STD, 7)
+    found = [(copy.info.disturbance, copy.info.column("fault_size")) for copy in faulty]
+    assert found == [("noise", "1 sd"), ("noise", "2 sd"), ("bias", "3 sd"), ("drift", "4 sd")]
+
+
+def test_durations_are_drawn_between_the_two_and_by_name_alone(make_case, make_recording):
+    case = make_case(faults=FAULTS | {"duration_s": {"low": 5.0, "high": 15.0}})
+    recordings = [make_recording(name, 60) for name in "abcdefgh"]
+    lengths = {}
+    for copy in inject_faults(recordings, case, STD, 7):
+        (interval,) = copy.intervals
+        lengths[copy.name] = interval.end_s - interval.start_s
+        assert interval.start_s >= 10.0
+        assert interval.end_s <= 60.0
+    drawn = np.array(list(lengths.values()))
+    assert drawn.min() >= 5.0
+    assert drawn.max() <= 15.0
+    assert drawn.max() - drawn.min() > 5.0
+    assert len(np.unique(drawn)) == len(drawn)
+    for copy in inject_faults(recordings[3:4], case, STD, 7):
+        (interval,) = copy.intervals
+        assert interval.end_s - interval.start_s == lengths[copy.name]
+
+
 def test_the_seed_alone_decides(make_case, make_recording):
     recordings = [make_recording("a", 60), make_recording("b", 60)]
     case = make_case(faults=FAULTS)
@@ -103,13 +160,27 @@ def test_disturbed_recordings_and_cases_without_faults_give_no_copies(make_case,
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"duration_s": 51.0}, r"61 s .* turn \(60 s\)"),
-        ({"duration_s": 0.5}, "shorter than one sample"),
+        ({"duration_s": {"low": 20.0, "high": 51.0}}, r"61 s .* turn \(60 s\)"),
+        ({"duration_s": {"low": 0.5, "high": 20.0}}, "shorter than one sample"),
         ({"delays_s": [11.0]}, "delays_s=11 reaches back before the recording"),
-        ({"sizes": [2.0, 2.0]}, "noise-speed-2.0 would be made twice"),
+        ({"sizes": FAULTS["sizes"] | {"noise": [2.0, 2.0]}}, "noise-speed-2.0 would be made twice"),
     ],
 )
 def test_faults_that_cannot_be_injected(make_case, make_recording, changes, message):
     case = make_case(faults=FAULTS | changes)
     with pytest.raises(OdisarError, match=message):
         inject_faults([make_recording("turn", 60)], case, STD, 7)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"duration_s": {"low": 20.0, "high": 10.0}}, r"low=20\.0 is above high=10\.0"),
+        ({"sizes": {"noise": [2.0], "drift": [2.0]}}, "bias is among kinds but has no size"),
+        ({"delays_s": []}, "delay is among kinds but has no size"),
+        ({"sizes_in": "percent"}, "sizes_in"),
+    ],
+)
+def test_faults_that_are_no_configuration(make_case, changes, message):
+    with pytest.raises(ValueError, match=message):
+        make_case(faults=FAULTS | changes)

@@ -7,7 +7,7 @@ import pytest
 
 from odisar.config.cases import Case
 from odisar.errors import OdisarError
-from odisar.recordings import csv_text
+from odisar.recordings import file_checks
 from odisar.recordings.quality import raise_on_errors
 from odisar.recordings.writer import write_recordings
 
@@ -117,7 +117,7 @@ def test_a_file_without_permission(boat, monkeypatch):
 
 
 def test_a_file_above_the_size_limit(boat, monkeypatch):
-    monkeypatch.setattr(csv_text, "MAX_FILE_BYTES", 1024**2)
+    monkeypatch.setattr(file_checks, "MAX_FILE_BYTES", 1024**2)
     with (boat.folder / "a.csv").open("wb") as file:
         file.truncate(2 * 1024**2)
     finding = boat.one("larger than the limit of 1 MiB")
@@ -217,9 +217,14 @@ def test_a_folder_that_is_missing_or_holds_nothing(boat):
 
 def test_other_formats_are_named_and_not_read(boat):
     boat.good("a.csv")
-    boat.write("b.parquet", b"PAR1")
+    boat.write("b.xlsx", b"PK")
+    boat.write(".hidden.csv", HEADER)
     boat.write("README.md", "about this folder")
-    assert [found.value for found in boat.read().findings] == ["b.parquet"]
+    (boat.folder / "older").mkdir()
+    boat.write("older/c.parquet", b"PAR1")
+    found = boat.found("not a CSV or Parquet file nor a ROS 2 bag")
+    assert [finding.value for finding in found] == [".hidden.csv", "b.xlsx", "older"]
+    assert boat.read().findings == found
 
 
 def test_too_many_recordings(make_boat):

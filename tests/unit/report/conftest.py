@@ -20,4 +20,7 @@ def workspace(tmp_path: Path) -> Workspace:
 
 @pytest.fixture
 def results(workspace: Workspace) -> Results:
-    return Results(workspace, ConfigView(load_config(ROOT), SECTIONS))
+    config = load_config(ROOT)
+    pipeline = config.pipeline.model_copy(update={"setups": ["vessel-all", "vessel-random"]})
+    shown = config.model_copy(update={"pipeline": pipeline})
+    return Results(workspace, ConfigView(shown, SECTIONS))

@@ -44,7 +44,8 @@ def tracker():
 
 
 @pytest.fixture
-def ready(workspace):
+def ready(workspace, monkeypatch):
+    monkeypatch.setattr(publish, "register_bundles", lambda *_: None)  # see test_registry
     workspace.figures.mkdir(parents=True)
     write_json(workspace.metrics, {"vessel-all.odisar.s1.auroc": 0.95})
     (report_folder(workspace.root) / "body.html").write_text("<p>the body</p>")

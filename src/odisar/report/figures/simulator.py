@@ -1,10 +1,11 @@
-"""The vessel simulator held against a sea trial, and the ferry in standard trials."""
+"""The simulators: the vessel's against a sea trial and in standard trials, the robot's office."""
 
 import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 
 from odisar.report.style import figure_style
+from odisar.simulators.robot.plausibility import MapTraces
 
 #: Part of the trial that is drawn: zigzags and a turning circle fit in it [s].
 _SHOWN_S = (1000.0, 2600.0)
@@ -52,4 +53,31 @@ def standard_trials(traces: pd.DataFrame) -> Figure:
         tracks.set(xlabel="to port [ship lengths]", ylabel="ahead [ship lengths]", title="turning")
         headings.set(xlabel="time [s]", ylabel="heading, to port [deg]", title="zigzag")
         figure.legend(loc="outside upper center", ncols=len(angles), title="thruster angle")
+    return figure
+
+
+def office_map(traces: MapTraces) -> Figure:
+    """Draw the office, and the paths of a few tasks over their numbered waypoints."""
+    rows, columns = traces.occupied.shape
+    extent = (0.0, columns * traces.resolution_m, 0.0, rows * traces.resolution_m)
+    colours = sns.color_palette("colorblind", len(traces.paths))
+    with figure_style():
+        figure = Figure(figsize=(8.4, 5.6))
+        axes = figure.subplots()
+        axes.imshow(
+            traces.occupied, cmap="Greys", vmin=0, vmax=1.6, origin="lower", extent=extent,
+            interpolation="nearest",
+        )  # fmt: skip
+        for number, (path, goals) in enumerate(zip(traces.paths, traces.waypoints, strict=True)):
+            colour, label = colours[number], f"task {number + 1}"
+            axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.2, label=label)
+            axes.plot(*path[0], marker="s", color=colour, markersize=5, markeredgecolor="white")
+            for order, goal in enumerate(goals[1:], start=1):
+                axes.annotate(
+                    str(order), goal, color="white", fontsize=7, ha="center", va="center",
+                    bbox={"boxstyle": "circle,pad=0.2", "facecolor": colour, "linewidth": 0},
+                )  # fmt: skip
+        axes.set(xlabel="x [m]", ylabel="y [m]")
+        axes.grid(visible=False)
+        figure.legend(loc="outside upper center", ncols=len(traces.paths))
     return figure

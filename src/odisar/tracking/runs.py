@@ -1,4 +1,4 @@
-"""MLflow, in one place: one parent run for a configuration, one nested run for a stage.
+"""Runs: one parent run for a configuration, one nested run for a stage.
 
 The parent is found by a *content key*, a hash of everything that decides results (parameters,
 pipeline, recordings, source code). Stages run in processes of their own; each finds or makes the

@@ -1,0 +1,124 @@
+"""How well a twin tells disturbed from undisturbed on development recordings: never on test."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odisar.capability.scores import reconstruction_error, state_reconstruction_errors
+from odisar.capability.scoring import Scorer
+from odisar.config.cases import Case
+from odisar.config.judging import EvaluationConfig
+from odisar.evaluation.cells import OVERALL, describe, disturbed_cells
+from odisar.evaluation.intervals import Resampler, bin_counts, bin_edges, shift_interval
+from odisar.evaluation.labels import label_active
+from odisar.evaluation.metrics import auroc_of_counts, count_levels
+from odisar.recordings.schema import Recording
+from odisar.seeding import generator
+
+
+@dataclass(frozen=True)
+class DevelopmentScore:
+    """AUROC of the reconstruction error under protocol P2, all strengths pooled.
+
+    ``auroc`` is None where the development recordings hold no disturbed or no undisturbed sample,
+    the interval (over recordings that vary together) also where there is only one cluster.
+    ``measured_on`` is a hash of the recordings and of which of their windows were scored: two
+    scores can be compared where it is the same.
+    """
+
+    auroc: float | None
+    ci_low: float | None
+    ci_high: float | None
+    recordings: int
+    windows: int
+    measured_on: str
+
+
+def judged_recordings(recordings: Sequence[Recording], case: Case) -> list[Recording]:
+    """Return the recordings that the case's ``overall`` rows judge, in the order of their names."""
+    ordered = sorted(recordings, key=lambda item: item.name)
+    cells = disturbed_cells([describe(item.info, case.groups) for item in ordered], case.groups)
+    chosen = {int(i) for cell in cells if cell.evaluated_on == OVERALL for i in cell.members}
+    return [ordered[i] for i in sorted(chosen)]
+
+
+def measure(
+    scorer: Scorer,
+    case: Case,
+    recordings: Sequence[Recording],
+    judging: EvaluationConfig,
+    *,
+    stride_steps: int,
+    seed: int,
+) -> DevelopmentScore:
+    """Score every ``stride_steps``-th window of the judged development recordings.
+
+    The windows are those of protocol P2: from one horizon after the first full context of each
+    segment, where the forecast errors have a score as well.
+    """
+    judged = judged_recordings(recordings, case)
+    parts = [_score(scorer, item, stride_steps) for item in judged]
+    scores = np.concatenate([np.empty(0), *(part[0] for part in parts)])
+    labels = np.concatenate([np.empty(0, dtype=bool), *(part[1] for part in parts)])
+    auroc = float(auroc_of_counts(*count_levels(scores, labels)))
+    low, high = float("nan"), float("nan")
+    if np.isfinite(auroc):
+        edges = bin_edges(scores, judging.bootstrap_bins)
+        binned = np.stack([bin_counts(*part, edges) for part in parts])
+        resampler = Resampler.draw(
+            [item.info.base_seed or item.name for item in judged],
+            judging.bootstrap_draws,
+            judging.confidence,
+            generator(seed, "development"),
+        )
+        drawn = resampler.totals(binned)
+        undisturbed, disturbed = binned.sum(axis=0)
+        offset = auroc - float(auroc_of_counts(disturbed, undisturbed))
+        interval = resampler.interval(auroc_of_counts(drawn[:, 1], drawn[:, 0]))
+        low, high = shift_interval(interval, offset)
+    return DevelopmentScore(
+        auroc=_known(auroc),
+        ci_low=_known(low),
+        ci_high=_known(high),
+        recordings=len(judged),
+        windows=len(scores),
+        measured_on=_hash(judged, stride_steps),
+    )
+
+
+def _score(
+    scorer: Scorer, recording: Recording, stride_steps: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return (window,) scores and labels at every ``stride_steps``-th judged position."""
+    spec = scorer.twin.spec
+    ahead = spec.horizon_steps if spec.known_ahead else 0
+    positions = np.concatenate(
+        [
+            spec.issue_positions(segment, 1, horizon_steps=ahead)[
+                spec.horizon_steps :: stride_steps
+            ]
+            for segment in recording.segments
+        ]
+    )
+    if positions.size == 0:
+        return np.empty(0), np.empty(0, dtype=bool)
+    output = scorer.forecast(recording, positions)
+    errors = state_reconstruction_errors(output.forecast.numpy(), output.reconstruction.numpy())
+    labels = label_active(recording.time_s[positions], recording.intervals)
+    return reconstruction_error(errors).astype(np.float64), labels
+
+
+def _hash(recordings: Sequence[Recording], stride_steps: int) -> str:
+    digest = hashlib.sha256(f"stride {stride_steps}".encode())
+    for item in recordings:
+        digest.update(f"\0{item.name}\0{item.segments}\0{item.intervals}\0".encode())
+        for values in (item.time_s, item.values):
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
