@@ -342,6 +342,19 @@ def test_many_files_are_all_checked_though_few_are_looked_at(folder, capsys):
     assert "error: 031.csv" in error
 
 
+def test_splits_that_are_written_down_are_taken(folder, capsys):
+    write_rovers(folder, files=5)
+    parts = ("train", "train", "validation", "calibration", "test")
+    rows = "".join(f"Fahrt {i},{part}\n" for i, part in enumerate(parts))
+    (folder / "recordings.csv").write_text(f"recording,split\n{rows}")
+    assert run("new-case", folder, "--name", "rover") == 0
+    printed = capsys.readouterr()
+    case = YAML(typ="safe").load(printed.out)["profiles"]["rover"]["cases"]["rover"]
+    assert case["splits"]["kind"] == "metadata"
+    assert case["faults"]["kinds"]
+    assert "Quality check: no findings." in printed.err
+
+
 def test_labels_stand_in_for_faults(folder, capsys):
     write_rovers(folder, files=12)
     (folder / "labels.csv").write_text("recording,start_s,end_s,label\nFahrt 0,40,80,slope\n")

@@ -212,7 +212,7 @@ def _judging(draft: Draft) -> Iterator[str]:
         8, f"guard_end_s: {scalar(_short(plan.context / rate_hz))}", note="... and so much after it"
     )
     yield line(8, "groups:")
-    if draft.extent.has_labels or draft.extent.has_splits:
+    if draft.extent.is_labelled:
         yield line(10, "overall: {}", note="judges all disturbed recordings together")
         yield line(10, "group_by: [disturbance]")
         yield line(10, "apart: []")
@@ -221,7 +221,7 @@ def _judging(draft: Draft) -> Iterator[str]:
         yield line(10, "group_by: [disturbance, fault_size, fault_channel]")
         yield line(10, "apart: [disturbance, fault_shows]")
     yield line(10, "with_clean: []")
-    if draft.extent.has_labels or draft.extent.has_splits:
+    if draft.extent.is_labelled:
         yield line(8, "faults: null")
     else:
         yield from _faults(draft)
@@ -235,7 +235,7 @@ def _faults(draft: Draft) -> Iterator[str]:
     delays = [max(round(plan.horizon * part), 1) / rate_hz for part in (0.2, 0.5)]
     delays = list(dict.fromkeys(map(_short, delays)))[: len(sizes)]
     length = seconds(plan.fault_duration, rate_hz)
-    yield line(8, "faults:", "injected: there is no labels.csv that says what is abnormal")
+    yield line(8, "faults:", "injected: nothing (such as labels.csv) says what is abnormal")
     yield line(10, f"kinds: [{', '.join(_KINDS)}]")
     yield line(10, f"channels: [{', '.join(scalar(name) for name in draft.faulty[:count])}]")
     yield line(10, f"sizes: {flow(**drawn)}", note="standard deviations of the channel")

@@ -35,6 +35,11 @@ class Extent:
     has_splits: bool
 
     @property
+    def is_labelled(self) -> bool:
+        """Whether something is known to be abnormal, so that no faults need be injected."""
+        return self.has_labels or self.clean < len(self.segments)
+
+    @property
     def samples(self) -> int:
         """All samples."""
         return sum(map(sum, self.segments))
