@@ -9,11 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from odisar.artifacts import Workspace, read_json, write_json
+from odisar.artifacts import Workspace, read_json, read_table, write_json
 from odisar.config.loader import ConfigView, load_config
 from odisar.deployment.development import DevelopmentScore
 from odisar.errors import OdisarError
-from odisar.report.load import report_folder
+from odisar.report.headline import headline_table
+from odisar.report.load import report_folder, rows_of
 from odisar.report.page import RunFacts, page_content, render_page
 from odisar.report.simulator_checks import show_sea_trial
 from odisar.stages.bundle import measure_again
@@ -29,6 +30,7 @@ from odisar.tracking import (
     git_revision,
 )
 from odisar.tracking.registry import register
+from odisar.tracking.story import results_note
 
 PARAMS = (
     "seed",
@@ -56,6 +58,13 @@ def run(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
     parent = tracker.parent()
     parent.params(sections)
     parent.metrics(read_json(workspace.metrics))
+    for epoch, values in learning_curves(workspace).items():
+        parent.metrics(values, step=epoch)
+    for name, profile in recordings_used(config, workspace).items():
+        folder = config.cases[name].source.folder
+        parent.dataset(name, data_hash(workspace.root), folder, profile)
+    table = headline_table(read_table(workspace.results / "detection.csv"))
+    parent.note(results_note(tracker.story, list(table.columns), table.to_numpy().tolist()))
     for setup in config.pipeline.setups:
         parent.artifact(workspace.thresholds(setup), "thresholds")
         parent.artifact(workspace.assessments(setup), "assessments")
@@ -64,6 +73,28 @@ def run(config: ConfigView, workspace: Workspace, tracker: Tracker) -> None:
     parent.artifact(workspace.report)
     register_bundles(config, workspace, parent)
     _mark(parent, workspace)
+
+
+def learning_curves(workspace: Workspace) -> dict[int, dict[str, float]]:
+    """Return, by epoch, the losses of every member that trained so long."""
+    curves: dict[int, dict[str, float]] = {}
+    for member, summary in read_json(workspace.train / "training.json").items():
+        for row in summary["history"]:
+            named = {f"{member}.{name}": value for name, value in row.items() if name != "epoch"}
+            curves.setdefault(int(row["epoch"]), {}).update(named)
+    return curves
+
+
+def recordings_used(config: ConfigView, workspace: Workspace) -> dict[str, dict[str, Any]]:
+    """Return, by case, recordings and hours of every split of each of its set-ups."""
+    splits = read_table(workspace.preprocess / "splits.csv")
+    used: dict[str, dict[str, Any]] = {name: {} for name in config.active_cases}
+    counted = ["recordings", "hours"]
+    totals = splits.groupby(["setup", "split"], sort=False, as_index=False)[counted].sum()
+    for row in rows_of(totals):
+        profile = used[config.setups[row.setup].case].setdefault(row.setup, {})
+        profile[row.split] = f"{row.recordings:.0f} recordings, {row.hours:.1f} h"
+    return used
 
 
 def register_bundles(config: ConfigView, workspace: Workspace, parent: TrackedRun) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from odisar.artifacts import Workspace
 from odisar.config.loader import ConfigView, load_config
 from odisar.tracking import Tracker
+from odisar.tracking.story import tell_story
 
 #: In the order of ``dvc.yaml``.
 STAGES = ("preprocess", "tune", "train", "calibrate", "evaluate", "bundle", "report", "publish")
@@ -23,7 +24,7 @@ def run_stage(name: str, root: Path) -> None:
     stage = importlib.import_module(f"odisar.stages.{name}")
     view = ConfigView(config, stage.PARAMS)
     workspace = Workspace(root)
-    tracker = Tracker(root, config.tracking.experiment)
+    tracker = Tracker(root, config.tracking.experiment, tell_story(config, root))
     with tracker.stage(name) as tracked:
         tracked.params({section: plain(getattr(config, section)) for section in stage.PARAMS})
         if name == STAGES[-1]:  # the last stage completes the parent run

@@ -1,6 +1,7 @@
 """A bundle as an MLflow model: models from code, with the code it needs, and without pickle."""
 
 import hashlib
+import logging
 import os
 import shutil
 import sys
@@ -33,7 +34,7 @@ def log_bundle(
     """Log the model into a run; return its address and id."""
     # `mlflow.pyfunc.log_model` would need an active run, and end it.
     mlflow.set_experiment(experiment_id=client.get_run(run.run_id).info.experiment_id)
-    with _without_progress_bars():
+    with _quietly():
         info = Model.log(
             artifact_path=None,
             name=deployed.manifest.origin.setup,
@@ -82,7 +83,7 @@ def prove(folder: Path, deployed: Deployed) -> None:
 
 def download(uri: str, folder: Path) -> None:
     """Copy a model's files into an empty folder, without byte code."""
-    with _without_progress_bars():
+    with _quietly():
         try:
             mlflow.artifacts.download_artifacts(artifact_uri=uri, dst_path=str(folder))
         except (MlflowException, OSError) as error:
@@ -112,13 +113,17 @@ def model_hash(folder: Path) -> str:
 
 
 @contextmanager
-def _without_progress_bars() -> Iterator[None]:
+def _quietly() -> Iterator[None]:
+    logger = logging.getLogger("mlflow")
+    level = logger.level
+    logger.setLevel(logging.WARNING)
     variable = "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR"
     before = os.environ.get(variable)
     os.environ[variable] = "false"
     try:
         yield
     finally:
+        logger.setLevel(level)
         if before is None:
             del os.environ[variable]
         else:

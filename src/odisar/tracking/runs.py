@@ -6,6 +6,7 @@ parent, so that cached and repeated stages neither lose nor double a run.
 """
 
 import hashlib
+import json
 import os
 import re
 import subprocess
@@ -16,8 +17,20 @@ from pathlib import Path
 from typing import Any
 
 import mlflow
-from mlflow.entities import Metric, Param, Run, RunStatus, RunTag
+from mlflow.entities import (
+    Dataset,
+    DatasetInput,
+    InputTag,
+    Metric,
+    Param,
+    Run,
+    RunStatus,
+    RunTag,
+)
 from mlflow.tracking import MlflowClient
+
+from odisar.config.loader import PARAMS_FILE, read_yaml
+from odisar.tracking.story import EXPERIMENT_NOTE, UNTOLD, Story
 
 #: Names another folder than the workspace as the home of the MLflow store.
 ROOT_VARIABLE = "ODISAR_TRACKING_ROOT"
@@ -48,9 +61,16 @@ def tracking_uri(root: Path) -> str:
 
 
 def content_key(root: Path) -> str:
-    """Return the hash of everything that decides this workspace's results."""
+    """Return the hash of everything that decides this workspace's results.
+
+    Of ``params.yaml`` its values, not its words, and no profile: those are for other workspaces.
+    """
     digest = hashlib.sha256()
-    named = [root / "params.yaml", root / "dvc.yaml", root / "data.dvc"]
+    if (root / PARAMS_FILE).exists():
+        params = read_yaml(root / PARAMS_FILE)
+        params.pop("profiles", None)
+        digest.update(json.dumps(params, default=str).encode())
+    named = [root / "dvc.yaml", root / "data.dvc"]
     for path in [*named, *sorted((root / "src").rglob("*.py"))]:
         if path.exists():
             digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
@@ -82,6 +102,18 @@ class TrackedRun:
         """Set tags."""
         self.client.log_batch(self.run_id, tags=[RunTag(k, v) for k, v in values.items()])
 
+    def note(self, text: str) -> None:
+        """Set the run's description, in Markdown."""
+        self.tags({_NOTE_TAG: text})
+
+    def dataset(self, name: str, digest: str, source: str, profile: Mapping[str, Any]) -> None:
+        """Log which recordings were used; the same ones twice are logged once."""
+        dataset = Dataset(
+            name, digest, "local", json.dumps({"uri": source}), profile=json.dumps(profile)
+        )
+        use = InputTag("mlflow.data.context", "pipeline")
+        self.client.log_inputs(self.run_id, [DatasetInput(dataset, [use])])
+
     def artifact(self, path: Path, folder: str | None = None) -> None:
         """Copy a file, or all of a folder, into the run."""
         if path.is_dir():
@@ -99,14 +131,17 @@ class TrackedRun:
 class Tracker:
     """The MLflow store of a workspace, and the parent run of what the workspace holds now."""
 
-    def __init__(self, root: Path, experiment: str) -> None:
+    def __init__(self, root: Path, experiment: str, story: Story = UNTOLD) -> None:
         self._root = root
+        self.story = story
         mlflow.set_tracking_uri(tracking_uri(root))
         self.client = MlflowClient(tracking_uri(root))
         found = self.client.get_experiment_by_name(experiment)
         if found is None:
             artifacts = (tracking_root(root) / "mlartifacts").as_uri()
-            self._experiment = self.client.create_experiment(experiment, artifacts)
+            self._experiment = self.client.create_experiment(
+                experiment, artifacts, tags={_NOTE_TAG: EXPERIMENT_NOTE}
+            )
         else:
             self._experiment = found.experiment_id
 
@@ -124,11 +159,11 @@ class Tracker:
             _CONTENT_TAG: key,
             "git.revision": git_revision(self._root),
             "data.hash": data_hash(self._root),
-            _NOTE_TAG: "One configuration through the whole pipeline; its stages are nested.",
+            _NOTE_TAG: self.story.note,
+            **self.story.tags,
         }
-        return TrackedRun(
-            self.client, _start(self.client, self._experiment, f"pipeline {key[:8]}", None, tags)
-        )
+        name = f"{self.story.title} ({key[:8]})"
+        return TrackedRun(self.client, _start(self.client, self._experiment, name, None, tags))
 
     @contextmanager
     def stage(self, name: str) -> Iterator[TrackedRun]:
@@ -140,7 +175,8 @@ class Tracker:
         parent.tags({PUBLISHED_TAG: ""})
         self._drop({_STAGE_TAG: name}, parent.run_id)
         self.client.update_run(parent.run_id, RunStatus.to_string(RunStatus.RUNNING))
-        run_id = _start(self.client, self._experiment, name, parent.run_id, {_STAGE_TAG: name})
+        tags = {_STAGE_TAG: name, _NOTE_TAG: self.story.stages.get(name, "")}
+        run_id = _start(self.client, self._experiment, name, parent.run_id, tags)
         try:
             yield from _finished(self.client, run_id)
         except BaseException:

@@ -11,6 +11,7 @@ from odisar.report.load import report_folder
 from odisar.report.page import page_content
 from odisar.stages import publish
 from odisar.tracking import content_key
+from odisar.tracking.story import UNTOLD
 
 from .invented import ROOT
 from .invented_tables import SETUPS
@@ -18,14 +19,24 @@ from .invented_tables import SETUPS
 
 class RememberingTracker:
     def __init__(self):
-        self.logged = {"params": {}, "metrics": {}, "artifacts": [], "tags": {}}
+        self.logged = {
+            "params": {},
+            "metrics": {},
+            "artifacts": [],
+            "tags": {},
+            "notes": [],
+            "datasets": [],
+        }
+        self.story = UNTOLD
 
     def parent(self):
         logged = self.logged
         return SimpleNamespace(
             params=logged["params"].update,
-            metrics=logged["metrics"].update,
+            metrics=lambda values, step=0: logged["metrics"].update(values) if not step else None,
             tags=logged["tags"].update,
+            note=logged["notes"].append,
+            dataset=lambda name, *_about: logged["datasets"].append(name),
             artifact=lambda path, _folder=None: logged["artifacts"].append(path.name),
         )
 
@@ -56,7 +67,9 @@ def test_the_parent_run_gets_everything(config, ready, tracker):
     publish.run(config, ready, tracker)
     logged = tracker.logged
     assert logged["params"]["training"]["epochs"] == config.training.epochs
-    assert logged["metrics"] == {"vessel-all.odisar.s1.auroc": 0.95}
+    assert logged["metrics"]["vessel-all.odisar.s1.auroc"] == 0.95
+    assert logged["datasets"] == list(config.active_cases)
+    assert "| set-up |" in logged["notes"][0]
     wanted = {f"{setup}.assessments.json" for setup in SETUPS} | {"report.html", "results"}
     assert wanted <= set(logged["artifacts"])
     assert list(logged["tags"].values()) == [content_key(ready.root)]

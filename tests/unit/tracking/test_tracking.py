@@ -1,7 +1,9 @@
 import pytest
 from mlflow.tracking import MlflowClient
 
+from odisar.config.loader import load_config
 from odisar.tracking import Tracker, content_key, flatten, tracking_root, tracking_uri
+from odisar.tracking.story import results_note, tell_story
 
 
 @pytest.fixture
@@ -65,3 +67,26 @@ def test_a_queued_copy_logs_to_the_repository(tmp_path, monkeypatch):
 
 def test_nested_parameters_get_dotted_names():
     assert flatten({"a": {"b": 1, "c": {"d": 2}}, "e": 3}) == {"a.b": 1, "a.c.d": 2, "e": 3}
+
+
+def test_words_and_profiles_do_not_change_the_content(workspace):
+    key = content_key(workspace)
+    (workspace / "params.yaml").write_text("seed: 1  # why\nprofiles: {mine: {seed: 3}}\n")
+    assert content_key(workspace) == key
+
+
+def test_the_run_tells_what_it_is(workspace, request):
+    root = request.config.rootpath
+    story = tell_story(load_config(root), root)
+    tracker = Tracker(workspace, "e", story)
+    with tracker.stage("train") as run:
+        run.dataset("vessel", "abc", "data/vessel", {"vessel-all": {"train": "44 recordings"}})
+    stage, parent = (tracker.client.get_run(i) for i in (run.run_id, tracker.parent().run_id))
+    assert parent.info.run_name.startswith("vessel-all + vessel-random + waypoint (")
+    assert "| vessel-random | Ro-Ro ferry" in parent.data.tags["mlflow.note.content"]
+    assert "maneuver: random" in parent.data.tags["mlflow.note.content"]
+    assert parent.data.tags["cases"] == "vessel, robot"
+    assert stage.data.tags["mlflow.note.content"] == "Train the twin of each set-up (DTM)"
+    assert stage.inputs.dataset_inputs[0].dataset.name == "vessel"
+    note = results_note(story, ["set-up", "AUROC %"], [["vessel-all", "96.4"]])
+    assert "| set-up | AUROC % |\n| --- | --- |\n| vessel-all | 96.4 |" in note
