@@ -18,6 +18,8 @@ _MEDIAN_TOLERANCE = 0.25
 
 _UNIT_SHARE = 0.05
 
+_PARTS_OF_A_SECOND = {"milliseconds": 10**3, "microseconds": 10**6, "nanoseconds": 10**9}
+
 Segments = tuple[tuple[int, int], ...]
 
 
@@ -156,11 +158,20 @@ def _check_not_slower(steps_s: NDArray[np.float64], case: Case, notes: Notes) ->
         return True
     notes.error(
         f"the recording is slower than rate_hz={case.rate_hz:g}",
-        "lower the case's rate_hz (and its steps): source.resample: hold would invent samples",
+        _other_unit(measured_hz, case)
+        or "lower the case's rate_hz (and its steps): source.resample: hold would invent samples",
         column=case.source.time_column,
         value=f"{measured_hz:.4g} Hz",
     )
     return False
+
+
+def _other_unit(measured_hz: float, case: Case) -> str:
+    """Say what to do about times that are no seconds, empty where they seem to be."""
+    for unit, parts in _PARTS_OF_A_SECOND.items():
+        if abs(measured_hz * parts / case.rate_hz - 1.0) <= _MEDIAN_TOLERANCE:
+            return f"the times look like {unit}: divide them by {parts:,}, time is in seconds"
+    return ""
 
 
 def _check_rate(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
@@ -179,7 +190,8 @@ def _check_rate(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
     resample = "set source.resample: hold" if faster else "resample the recording"
     notes.error(
         f"the rate is not rate_hz={case.rate_hz:g}",
-        f"{resample}, or change the case's rate_hz (and its steps)",
+        _other_unit(measured_hz, case)
+        or f"{resample}, or change the case's rate_hz (and its steps)",
         column=case.source.time_column,
         value=f"{measured_hz:.4g} Hz",
     )

@@ -112,7 +112,13 @@ def require_disturbed(splits: pd.DataFrame) -> None:
 
 
 def print_warnings(findings: list[Finding]) -> None:
-    """Say what was found but did not stop the run; the report shows it too."""
+    """Say what was found but did not stop the run, once a kind; the report shows each."""
+    files: dict[tuple[str, str, str], list[str]] = {}
     for finding in findings:
-        place = f"{finding.file}, {finding.column}" if finding.column else finding.file
-        print(f"warning: {place}: {finding.problem}; {finding.remedy}")  # noqa: T201
+        kind = (finding.column, finding.problem, finding.remedy)
+        files.setdefault(kind, []).append(finding.file)
+    for (column, problem, remedy), named in files.items():
+        others = len(set(named)) - 1
+        more = f" and {others} other file{'s' if others > 1 else ''}" if others else ""
+        place = f"{named[0]}{more}" + (f", {column}" if column else "")
+        print(f"warning: {place}: {problem}; {remedy}")  # noqa: T201

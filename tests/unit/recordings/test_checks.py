@@ -43,6 +43,16 @@ def test_another_rate_is_one_error_and_no_gaps(boat, rate_hz):
     assert found[0].value == f"{rate_hz:.4g} Hz"
 
 
+@pytest.mark.parametrize(
+    ("parts", "unit"), [(10**3, "milliseconds"), (10**6, "microseconds"), (10**9, "nanoseconds")]
+)
+def test_times_in_another_unit_are_recognised(boat, parts, unit):
+    lines = (f"{i * parts},{i % 7},{i % 5},{i % 3}\n" for i in range(300))
+    boat.write("a.csv", HEADER + "".join(lines))
+    remedy = boat.one("the rate is not rate_hz=1").remedy
+    assert remedy == f"the times look like {unit}: divide them by {parts:,}, time is in seconds"
+
+
 def test_jitter_below_half_a_sample_is_fine(boat):
     jitter = np.random.default_rng(1).uniform(-0.24, 0.24, 300)
     lines = (f"{i + jitter[i]:.4f},{i % 7},{i % 5},{i % 3}\n" for i in range(300))
