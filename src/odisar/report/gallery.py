@@ -55,6 +55,7 @@ class Plate:
     """
 
     name: str
+    title: str
     section: Section
     caption: str
     draw: Callable[[Results, str], Figure]
@@ -76,6 +77,7 @@ class Drawn:
 PLATES = (
     Plate(
         "baselines-by-strength",
+        "Detection by strength of the disturbance (P2)",
         "detection",
         "Detection by strength of the disturbance under P2 (the score at t against 'disturbed at "
         "t'). Hollow diamonds, if any: published, with other data and another protocol.",
@@ -83,6 +85,7 @@ PLATES = (
     ),
     Plate(
         "baselines-by-scenario",
+        "Detection by scenario (P2)",
         "detection",
         "Detection by scenario under P2, at the greatest strength if there are several.",
         baselines_by_scenario,
@@ -90,6 +93,7 @@ PLATES = (
     ),
     Plate(
         "apart",
+        "Judged apart from the overall rows (P2)",
         "detection",
         "What is left out of the overall rows and judged apart, beside the overall at the same "
         "strength (P2). Groups that are disturbed from end to end are ranked against the "
@@ -99,6 +103,7 @@ PLATES = (
     ),
     Plate(
         "fault-heat-map",
+        "Share of faulty time that is flagged",
         "detection",
         "Share of the faulty time with a score above its threshold, by fault and channel.",
         fault_heat_map,
@@ -106,6 +111,7 @@ PLATES = (
     ),
     Plate(
         "operating-point",
+        "Alarms at the operating point",
         "detection",
         "Alarms at the operating point: false alarms with exact Poisson intervals, events found, "
         "delay after onset, and median time from alarm to consequence (below zero: too late).",
@@ -114,6 +120,7 @@ PLATES = (
     ),
     Plate(
         "protocols",
+        "The same scores under four protocols",
         "protocols",
         "The same scores under four protocols, at the greatest strength if there are several. The "
         "oracle knows whether "
@@ -122,6 +129,7 @@ PLATES = (
     ),
     Plate(
         "quadrants",
+        "Confidence quadrants by scenario",
         "quadrants",
         "Share of assessed windows in each confidence quadrant. Windows of disturbed recordings "
         "before, in and after the event count, as published.",
@@ -130,6 +138,7 @@ PLATES = (
     ),
     Plate(
         "quadrant-scatter",
+        "Every assessed window by error and variance",
         "quadrants",
         "Every assessed window of the test recordings: right of the dashed line is OOD, above the "
         "dotted line is uncertain. If the variance told disturbed from undisturbed windows, the "
@@ -138,6 +147,7 @@ PLATES = (
     ),
     Plate(
         "forecasts",
+        "Forecasts before, soon after and in an event",
         "events",
         "Forecasts issued just before the event, soon after its onset and in its middle, with "
         "what was recorded. The recorded future is drawn for comparison; the twin never sees it.",
@@ -145,6 +155,7 @@ PLATES = (
     ),
     Plate(
         "event",
+        "One event: score, quadrants, blamed states",
         "events",
         "One event: the score as it was known at each time, the quadrant of each assessed window, "
         "and the states blamed in windows flagged as OOD. Quadrant and blame are drawn over the "
@@ -153,6 +164,7 @@ PLATES = (
     ),
     Plate(
         "attribution",
+        "States that flagged windows blame",
         "events",
         "Which states the flagged windows blame, at the greatest strength if there are several.",
         attribution_shares,
@@ -160,6 +172,7 @@ PLATES = (
     ),
     Plate(
         "recordings",
+        "A disturbed and an undisturbed test recording",
         "recordings",
         "Every channel of one disturbed and one undisturbed test recording; commands in grey.",
         recordings_overview,
@@ -167,6 +180,7 @@ PLATES = (
     ),
     Plate(
         "training",
+        "Training: forecast and reconstruction error",
         "learning",
         "Training of each twin. The twin with the lowest validation forecast error is kept.",
         training_curves,
@@ -185,11 +199,11 @@ def draw_figures(results: Results, folder: Path) -> list[Drawn]:
         for subject in subjects:
             if plate.applies(results, subject):
                 path = folder / f"{plate.name}-{subject}.png"
-                save_figure(plate.draw(results, subject), path)
+                save_figure(plate.draw(results, subject), path, f"{plate.title}: {subject}")
                 caption = f"{plate.caption} {plate.note(results, subject)}".strip()
                 drawn.append(Drawn(plate.section, subject, caption, path))
     path = folder / "tuning-trials.png"
-    save_figure(tuning_trials(results), path)
+    save_figure(tuning_trials(results), path, "Tuning trials of each set-up")
     caption = "Every tuning trial's validation forecast error; no disturbed recording is looked at."
     if any(len(results.tuning(setup)) > 1 for setup in results.setups):
         caption += " Each fold has a study of its own; their trials stand side by side."

@@ -47,7 +47,9 @@ def _check_vessel(config: SimulatorsConfig, folder: Path) -> tuple[Table, Drawn]
         "of the rudder angle, and the largest roll in any manoeuvre at strength 1.",
     )
     path = folder / "standard-trials.png"
-    save_figure(standard_trials(trial_traces(config.vessel)), path)
+    save_figure(
+        standard_trials(trial_traces(config.vessel)), path, "The simulated ferry in calm water"
+    )
     caption = "The simulated ferry in calm water: turning circles and zigzags at four angles."
     return table, Drawn("simulator", "", caption, path)
 
@@ -59,7 +61,7 @@ def _check_robot(config: SimulatorsConfig, folder: Path) -> tuple[Table, Drawn]:
         "Over undisturbed tasks; the ranges are those of an indoor base of its size.",
     )
     path = folder / "office-map.png"
-    save_figure(office_map(map_traces(config.robot, config.seed)), path)
+    save_figure(office_map(map_traces(config.robot, config.seed)), path, "The simulated office")
     caption = "The office, and the paths of some undisturbed tasks with their waypoints."
     return table, Drawn("simulator", "", caption, path)
 
@@ -78,7 +80,7 @@ def show_sea_trial(file: PinnedFile, root: Path, figure: Path) -> SeaTrial:
             "`make report`."
         )
         return SeaTrial([], [], advice)
-    save_figure(sea_trial(validation_traces(trial)), figure)
+    save_figure(sea_trial(validation_traces(trial)), figure, "The vessel model and a sea trial")
     drawn = Drawn("sea-trial", "", _CAPTION, figure)
     return SeaTrial([overview.sea_trial(sea_trial_table(trial))], [drawn])
 

@@ -93,9 +93,10 @@ def use_figure_style() -> None:
     set_matplotlib_formats("png", bbox_inches=None)  # type: ignore[no-untyped-call]
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a PNG; the same figure gives the same bytes."""
+def save_figure(figure: Figure, path: Path, title: str) -> None:
+    """Write a titled PNG, which stands alone in MLflow and DVC; same figure, same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    figure.suptitle(title, fontsize=10, fontfamily="DejaVu Sans")
     figure.savefig(path, dpi=_DPI, metadata=_NO_METADATA)
 
 
@@ -123,6 +124,11 @@ def detector_marker(detector: str, detectors: Sequence[str]) -> str:
 def strength_name(strength: float) -> str:
     """Return a strength for an axis; recordings without one are simply all of them."""
     return "all" if pd.isna(strength) else f"{strength:g}"
+
+
+def with_strength(scenario: str, strength: float) -> str:
+    """Return a scenario's name with its strength, if it has one, for an axis."""
+    return scenario if pd.isna(strength) else f"{scenario}, {strength_name(strength)}"
 
 
 def shade_events(axes: Axes, events: Sequence[tuple[float, float]], label: str = "event") -> None:

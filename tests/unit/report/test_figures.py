@@ -33,7 +33,7 @@ def test_no_panel_is_left_empty(results, plate):
 def test_a_figure_is_the_same_bytes_twice_and_names_no_program(results, tmp_path):
     paths = [tmp_path / "one.png", tmp_path / "two.png"]
     for path in paths:
-        save_figure(baselines_by_strength(results, "vessel-all"), path)
+        save_figure(baselines_by_strength(results, "vessel-all"), path, "strengths")
     one, two = (path.read_bytes() for path in paths)
     assert one == two
     assert b"Software" not in one

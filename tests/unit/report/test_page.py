@@ -17,7 +17,7 @@ FACTS = RunFacts("abc123", "f00", "beef", "odisar", "2026-01-01", [("train", "fr
 @pytest.fixture
 def figures(results, tmp_path):
     path = tmp_path / "figures/one.png"
-    save_figure(tuning_trials(results), path)
+    save_figure(tuning_trials(results), path, "trials")
     return [Drawn("learning", "", "A caption", path)]
 
 

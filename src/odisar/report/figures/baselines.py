@@ -18,6 +18,7 @@ from odisar.report.style import (
     detector_name,
     figure_style,
     strength_name,
+    with_strength,
 )
 
 METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
@@ -69,10 +70,18 @@ def components_apart(results: Results, setup: str) -> Figure:
     strengths = rows[rows.evaluated_on.isin(apart)].strength.unique()
     same = rows.strength.isin(strengths) | rows.strength.isna()
     rows = rows[same & rows.evaluated_on.isin([OVERALL, *apart])]
-    names = [name for name in (OVERALL, *apart) if name in set(rows.evaluated_on)]
-    rows = rows.assign(place=[names.index(name) for name in rows.evaluated_on], published=np.nan)
-    at = ", ".join(strength_name(s) for s in strengths if pd.notna(s))
-    return _by_metric(results, setup, rows, names, f"strength {at}" if at else "")
+    order = {name: place for place, name in enumerate((OVERALL, *apart))}
+    rows = rows.assign(order=rows.evaluated_on.map(order), published=np.nan)
+    rows = rows.sort_values(["order", "strength"], kind="stable")
+    several = len(strengths) > 1
+    labels = [
+        with_strength(name, strength) if several else str(name)
+        for name, strength in zip(rows.evaluated_on, rows.strength, strict=True)
+    ]
+    names = list(dict.fromkeys(labels))
+    rows = rows.assign(place=[names.index(label) for label in labels])
+    at = "" if several or pd.isna(strengths[0]) else f"strength {strength_name(strengths[0])}"
+    return _by_metric(results, setup, rows, names, at, upright=not several)
 
 
 def has_components(results: Results, setup: str) -> bool:
@@ -209,4 +218,4 @@ def _legend(figure: Figure, detectors: Sequence[str], *, has_published: bool) ->
                 label="published, same colour",
             )
         )
-    figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)

@@ -82,7 +82,7 @@ def _forecast_legend(figure: Figure) -> None:
         Line2D([], [], color=_RECONSTRUCTION, ls="--", label="reconstruction of the forecast"),
         Patch(facecolor=EVENT_COLOUR, alpha=0.55, label="event"),
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
 
 
 def event_attribution(results: Results, setup: str) -> Figure:

@@ -1,6 +1,7 @@
 """The four confidence quadrants: how often, and where every window lies."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,31 +19,33 @@ from odisar.report.style import (
     QUADRANTS,
     figure_style,
     strength_name,
+    with_strength,
 )
 
 #: Shares below this are too narrow to carry their number.
 _SHOWN_SHARE = 0.07
 _POINTS_EACH = 4000
+#: Share of scenarios that must exist at each strength for a panel a strength to be worth it.
+_DENSE = 0.6
 
 
 def quadrant_distribution(results: Results, setup: str) -> Figure:
     """Draw the share of windows in each quadrant, by scenario and strength (the paper's RQ2)."""
     table = results.quadrants[results.quadrants.setup == setup]
-    scenarios = list(results.scenarios(setup).evaluated_on)
-    strengths = sorted(table.strength.unique(), key=lambda value: (pd.notna(value), value))
+    panels = _panels(table, list(results.scenarios(setup).evaluated_on))
+    rows = panels[0].rows
     published = _published(table)
-    panels = len(strengths) + (published is not None)
+    columns = len(panels) + (published is not None)
     with figure_style():
-        figure = Figure(figsize=(max(2.3 * panels + 1.4, 6.8), 0.3 * len(scenarios) + 1.5))
-        grid = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
-        for axes, strength in zip(grid, strengths, strict=False):
-            same = table.strength.isna() if pd.isna(strength) else table.strength == strength
-            _bars(axes, table[same], scenarios)
-            axes.set_title("" if pd.isna(strength) else f"strength {strength_name(strength)}")
+        figure = Figure(figsize=(max(2.3 * columns + 1.4, 6.8), 0.3 * len(rows) + 1.7))
+        grid = figure.subplots(1, columns, sharey=True, squeeze=False)[0]
+        for axes, panel in zip(grid, panels, strict=False):
+            _bars(axes, panel.table, rows)
+            axes.set_title(panel.title)
         if published is not None:
-            _published_ranges(grid[-1], published, len(scenarios))
-        grid[0].set_yticks(range(len(scenarios)), scenarios)
-        grid[0].set_ylim(len(scenarios) - 0.4, -0.6)
+            _published_ranges(grid[-1], published, len(rows))
+        grid[0].set_yticks(range(len(rows)), rows)
+        grid[0].set_ylim(len(rows) - 0.4, -0.6)
         figure.supxlabel("share of assessed windows of disturbed recordings [%]", fontsize=9)
         _legend(figure)
     return figure
@@ -53,8 +56,42 @@ def has_quadrants(results: Results, setup: str) -> bool:
     return bool((results.quadrants.setup == setup).any())
 
 
+@dataclass(frozen=True)
+class _Panel:
+    """Shares by ``row`` and quadrant under one title."""
+
+    title: str
+    rows: list[str]
+    table: pd.DataFrame
+
+
+def _panels(table: pd.DataFrame, scenarios: list[str]) -> list[_Panel]:
+    """Return a panel for each strength; one for all where most scenarios have their own."""
+    strengths = sorted(table.strength.unique(), key=lambda value: (pd.notna(value), value))
+    cells = table[["evaluated_on", "strength"]].drop_duplicates()
+    if len(cells) >= _DENSE * len(scenarios) * len(strengths):
+        named = table.assign(row=table.evaluated_on)
+        return [
+            _Panel(
+                "" if pd.isna(strength) else f"strength {strength_name(strength)}",
+                scenarios,
+                named[named.strength.isna() if pd.isna(strength) else named.strength == strength],
+            )
+            for strength in strengths
+        ]
+    named = table.assign(
+        row=[
+            with_strength(name, strength)
+            for name, strength in zip(table.evaluated_on, table.strength, strict=True)
+        ]
+    )
+    order = {name: place for place, name in enumerate(scenarios)}
+    ordered = named.assign(place=named.evaluated_on.map(order)).sort_values(["place", "strength"])
+    return [_Panel("", list(dict.fromkeys(ordered.row)), named)]
+
+
 def _bars(axes: Axes, table: pd.DataFrame, scenarios: Sequence[str]) -> None:
-    shares = table.pivot_table(index="evaluated_on", columns="quadrant", values="share")
+    shares = table.pivot_table(index="row", columns="quadrant", values="share")
     shares = shares.reindex(index=list(scenarios), columns=list(QUADRANTS))
     left = np.zeros(len(scenarios))
     for quadrant in QUADRANTS:
@@ -133,7 +170,7 @@ def _legend(figure: Figure) -> None:
         )
         for quadrant in QUADRANTS
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=4)
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
 
 
 def quadrant_scatter(results: Results, setup: str) -> Figure:
