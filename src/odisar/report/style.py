@@ -6,11 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 from matplotlib_inline.backend_inline import set_matplotlib_formats
+from numpy.typing import NDArray
 
 #: Most abnormal last: the order in which shares are stacked.
 QUADRANTS = ("green", "yellow", "orange", "red")
@@ -61,6 +65,9 @@ SHARES = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood", "events_detected")
 EVENT_COLOUR = "#b8c4d6"
 
 _DPI = 150
+_TITLE_INCHES = 0.32
+#: Names up to here fit beside a panel of a small multiple.
+_LABEL_CHARACTERS = 14
 # Without these, the file would name the version of the program that drew it.
 _NO_METADATA = {"Software": None, "Creation Time": None}
 _SETTINGS: dict[Any, Any] = {
@@ -94,10 +101,32 @@ def use_figure_style() -> None:
 
 
 def save_figure(figure: Figure, path: Path, title: str) -> None:
-    """Write a titled PNG, which stands alone in MLflow and DVC; same figure, same bytes."""
+    """Write a PNG with a title above, which stands alone in MLflow and DVC; same bytes each time.
+
+    The title is a strip of its own: matplotlib would draw it over a legend outside of the axes.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.suptitle(title, fontsize=10, fontfamily="DejaVu Sans")
-    figure.savefig(path, dpi=_DPI, metadata=_NO_METADATA)
+    strip = Figure(figsize=(figure.get_figwidth(), _TITLE_INCHES))
+    strip.set_layout_engine("none")
+    strip.text(0.5, 0.3, title, ha="center", fontsize=10.5, fontfamily="DejaVu Sans")
+    image = np.concatenate([_pixels(strip), _pixels(figure)])
+    imsave(path, image, dpi=_DPI, metadata=_NO_METADATA)  # type: ignore[arg-type]
+
+
+def _pixels(figure: Figure) -> NDArray[np.uint8]:
+    canvas = FigureCanvasAgg(figure)
+    figure.set_dpi(_DPI)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    return np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+
+
+def channel_label(name: str, unit: str) -> str:
+    """Return a channel's name, broken once where it can be, and its unit below, for an axis."""
+    sign = " " if " " in name else "_"
+    first, found, rest = name.partition(sign)
+    if not found or (sign == "_" and len(name) <= _LABEL_CHARACTERS):
+        return f"{name}\n[{unit}]"
+    return f"{first}{sign.strip()}\n{rest}\n[{unit}]"
 
 
 def detector_name(detector: str) -> str:

@@ -218,4 +218,4 @@ def _legend(figure: Figure, detectors: Sequence[str], *, has_published: bool) ->
                 label="published, same colour",
             )
         )
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)

@@ -15,9 +15,10 @@ from odisar.report.style import (
     EVENT_COLOUR,
     QUADRANT_COLOURS,
     QUADRANT_HATCHES,
+    channel_label,
     figure_style,
     shade_events,
-    strength_name,
+    with_strength,
 )
 
 _FORECAST, _RECONSTRUCTION, _TRUTH = "#D55E00", "#009E73", "#222222"
@@ -48,7 +49,7 @@ def forecast_examples(results: Results, setup: str) -> Figure:
                 shade_events(axes, _inside(example["events"], trace))
                 if column == 0:
                     unit = example["units"][state]
-                    axes.set_ylabel(f"{state.replace(' ', chr(10), 1)}\n[{unit}]")
+                    axes.set_ylabel(channel_label(state, unit))
             axes.set_xlim((issued_s - context_s) / 60, float(here.time_s.max()) / 60)
             grid[0][column].set_title(f"issued at {issued_s / 60:.1f} min")
             grid[-1][column].set_xlabel("time [min]")
@@ -82,7 +83,7 @@ def _forecast_legend(figure: Figure) -> None:
         Line2D([], [], color=_RECONSTRUCTION, ls="--", label="reconstruction of the forecast"),
         Patch(facecolor=EVENT_COLOUR, alpha=0.55, label="event"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
 
 
 def event_attribution(results: Results, setup: str) -> Figure:
@@ -164,7 +165,15 @@ def attribution_shares(results: Results, setup: str) -> Figure:
     scenarios = results.scenarios(setup)
     apart = list(scenarios[scenarios.is_apart].evaluated_on)
     table = table[same | table.evaluated_on.isin(apart)]
-    names = [name for name in scenarios.evaluated_on if name in set(table.evaluated_on)]
+    order = {name: place for place, name in enumerate(scenarios.evaluated_on)}
+    table = table.assign(
+        place=table.evaluated_on.map(order),
+        row=[
+            with_strength(name, strength)
+            for name, strength in zip(table.evaluated_on, table.strength, strict=True)
+        ],
+    ).sort_values(["place", "strength"], kind="stable")
+    names = list(dict.fromkeys(table.row))
     states = [name for name in results.case_of(setup).output_names if name in set(table.state)]
     with figure_style():
         figure = Figure(figsize=(8.4, 0.3 * max(len(names), 2) + 1.6))
@@ -172,11 +181,9 @@ def attribution_shares(results: Results, setup: str) -> Figure:
         for axes, column, title in zip(
             grid, ("top_1", "top_3"), ("named first", "among the first three"), strict=True
         ):
-            shares = table.pivot_table(index="evaluated_on", columns="state", values=column)
+            shares = table.pivot_table(index="row", columns="state", values=column)
             _heat(axes, 100 * shares.reindex(index=names, columns=states))
             axes.set_title(f"{title} [% of flagged windows]")
-        at = "" if pd.isna(strongest) else f"strength {strength_name(strongest)}"
-        figure.supylabel(at, fontsize=9)
     return figure
 
 

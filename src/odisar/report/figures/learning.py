@@ -38,7 +38,7 @@ def training_curves(results: Results, setup: str) -> Figure:
             axes.set_visible(False)
         figure.supxlabel("epoch", fontsize=9)
         figure.supylabel("mean squared error [scaled units$^2$]", fontsize=9)
-        figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
@@ -58,7 +58,7 @@ def tuning_trials(results: Results) -> Figure:
         grid[0].set_ylabel("validation forecast\nerror [scaled units$^2$]")
         figure.supxlabel("trial (0: the configured values)", fontsize=9)
         handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
 

@@ -36,7 +36,7 @@ def operating_point(results: Results, setup: str) -> Figure:
         lead.axhline(0, color="black", linewidth=0.7)
         lead.set_title("median lead time before\na consequence [s]")
         handles, labels = detected.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure
 
 

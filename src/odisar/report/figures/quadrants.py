@@ -170,7 +170,7 @@ def _legend(figure: Figure) -> None:
         )
         for quadrant in QUADRANTS
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    figure.legend(handles=handles, loc="outside upper center", ncols=4)
 
 
 def quadrant_scatter(results: Results, setup: str) -> Figure:

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from odisar.report.load import Results
-from odisar.report.style import figure_style, shade_events
+from odisar.report.style import channel_label, figure_style, shade_events
 
 _STATE, _COMMAND = "#0072B2", "#444444"
 
@@ -28,7 +28,7 @@ def recordings_overview(results: Results, case: str) -> Figure:
                 _trace(axes, own[own.channel == channel.name], channel.role)
                 shade_events(axes, example["events"])
                 if column == 0:
-                    axes.set_ylabel(f"{channel.name.replace(' ', chr(10), 1)}\n[{channel.unit}]")
+                    axes.set_ylabel(channel_label(channel.name, channel.unit))
             grid[0][column].set_title(
                 f"{kind_name(kind if example['events'] else 'clean')}\n{example['recording']}"
             )

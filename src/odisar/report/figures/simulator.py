@@ -4,7 +4,7 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 
-from odisar.report.style import figure_style
+from odisar.report.style import channel_label, figure_style
 from odisar.simulators.robot.plausibility import MapTraces
 
 #: Part of the trial that is drawn: zigzags and a turning circle fit in it [s].
@@ -26,10 +26,10 @@ def sea_trial(traces: pd.DataFrame) -> Figure:
             minutes = own.time_s / 60
             axes.plot(minutes, own.measured, color="#222222", linewidth=0.9, label="measured")
             axes.plot(minutes, own.simulated, color="#D55E00", lw=1.0, ls="--", label="simulated")
-            axes.set_ylabel(f"{state.replace(' ', chr(10), 1)}\n[{own.unit.iloc[0]}]")
+            axes.set_ylabel(channel_label(state, own.unit.iloc[0]))
         grid[-1].set_xlabel("time of the trial [min]")
         handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        figure.legend(handles, labels, loc="outside upper center", ncols=2)
         figure.align_ylabels()
     return figure
 
@@ -52,7 +52,7 @@ def standard_trials(traces: pd.DataFrame) -> Figure:
         tracks.set_aspect("equal", adjustable="datalim")
         tracks.set(xlabel="to port [ship lengths]", ylabel="ahead [ship lengths]", title="turning")
         headings.set(xlabel="time [s]", ylabel="heading, to port [deg]", title="zigzag")
-        figure.legend(loc="outside lower center", ncols=len(angles), title="thruster angle")
+        figure.legend(loc="outside upper center", ncols=len(angles), title="thruster angle")
     return figure
 
 
@@ -79,5 +79,5 @@ def office_map(traces: MapTraces) -> Figure:
                 )  # fmt: skip
         axes.set(xlabel="x [m]", ylabel="y [m]")
         axes.grid(visible=False)
-        figure.legend(loc="outside lower center", ncols=len(traces.paths))
+        figure.legend(loc="outside upper center", ncols=len(traces.paths))
     return figure
