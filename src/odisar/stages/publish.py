@@ -18,7 +18,7 @@ from odisar.report.load import report_folder, rows_of
 from odisar.report.page import RunFacts, page_content, render_page
 from odisar.report.simulator_checks import show_sea_trial
 from odisar.stages.bundle import measure_again
-from odisar.stages.runner import STAGES, plain, run_stage
+from odisar.stages.runner import STAGES, plain_sections, run_stage
 from odisar.tracking import (
     FINISHED,
     PUBLISHED_TAG,
@@ -162,8 +162,8 @@ def ensure_published(root: Path) -> None:
 
 
 def configured(config: ConfigView) -> dict[str, Any]:
-    """Return every section as plain mappings."""
-    return {name: plain(getattr(config, name)) for name in PARAMS}
+    """Return every section as plain mappings, of set-ups and cases those that are run."""
+    return plain_sections(config, PARAMS)
 
 
 def _duration(seconds: float | None) -> str:

@@ -2,7 +2,9 @@
 
 import importlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from odisar.artifacts import Workspace
 from odisar.config.loader import ConfigView, load_config
@@ -26,13 +28,22 @@ def run_stage(name: str, root: Path) -> None:
     workspace = Workspace(root)
     tracker = Tracker(root, config.tracking.experiment, tell_story(config, root))
     with tracker.stage(name) as tracked:
-        tracked.params({section: plain(getattr(config, section)) for section in stage.PARAMS})
+        tracked.params(plain_sections(config, stage.PARAMS))
         if name == STAGES[-1]:  # the last stage completes the parent run
             stage.run(view, workspace, tracker)
         else:
             stage.run(view, workspace, tracked)
     if name == STAGES[-1]:
         tracker.finish()
+
+
+def plain_sections(config: Any, names: Sequence[str]) -> dict[str, Any]:
+    """Return sections as plain mappings, without set-ups and cases that are not run."""
+    sections: dict[str, Any] = {name: plain(getattr(config, name)) for name in names}
+    kept = {"setups": config.pipeline.setups, "cases": config.active_cases}
+    for name in kept.keys() & sections.keys():
+        sections[name] = {k: v for k, v in sections[name].items() if k in kept[name]}
+    return sections
 
 
 def plain(section: object) -> object:

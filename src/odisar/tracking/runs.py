@@ -40,6 +40,11 @@ PUBLISHED_TAG = "odisar.published"
 FINISHED = RunStatus.to_string(RunStatus.FINISHED)
 _CONTENT_TAG, _STAGE_TAG, _PARENT_TAG = "odisar.content", "DVC_STAGE", "mlflow.parentRunId"
 _NAME_TAG, _NOTE_TAG = "mlflow.runName", "mlflow.note.content"
+# The kind decides which pages the UI offers: those for training, not those for language models.
+_EXPERIMENT_TAGS = {
+    _NOTE_TAG: EXPERIMENT_NOTE,
+    "mlflow.experimentKind": "custom_model_development",
+}
 #: DVC runs queued experiments in a temporary copy below the repository.
 _QUEUE_FOLDER = ".dvc/tmp/exps"
 #: MLflow refuses longer values of a parameter.
@@ -140,10 +145,13 @@ class Tracker:
         if found is None:
             artifacts = (tracking_root(root) / "mlartifacts").as_uri()
             self._experiment = self.client.create_experiment(
-                experiment, artifacts, tags={_NOTE_TAG: EXPERIMENT_NOTE}
+                experiment, artifacts, tags=_EXPERIMENT_TAGS
             )
         else:
             self._experiment = found.experiment_id
+            for name, value in _EXPERIMENT_TAGS.items():
+                if name not in found.tags:  # made by hand, or by an earlier version
+                    self.client.set_experiment_tag(self._experiment, name, value)
 
     def find_parent(self) -> Run | None:
         """Return the parent run of this content, if there is one."""

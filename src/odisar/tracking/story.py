@@ -34,7 +34,7 @@ UNTOLD = Story("pipeline", "", {}, {})
 def tell_story(config: Config, root: Path) -> Story:
     """Return what is said of the workspace's configuration."""
     setups = config.pipeline.setups
-    lines = [f"# {config.report.title}", "", "| set-up | case | trained on |", "|---|---|---|"]
+    lines = [f"**{config.report.title}**", "", "| set-up | case | trained on |", "|---|---|---|"]
     for name in setups:
         select = config.setups[name].select
         kept = "; ".join(f"{key}: {', '.join(values)}" for key, values in select.items())
@@ -46,10 +46,10 @@ def tell_story(config: Config, root: Path) -> Story:
 def results_note(story: Story, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return the description of a finished run: what it is, and what came out."""
     table = [heads, ["---"] * len(heads), *rows]
-    lines = ["", "## Results (P2, test recordings, 95 % intervals)", ""]
+    lines = ["**Results (P2, test recordings, 95 % intervals)**", ""]
     lines += [f"| {' | '.join(row)} |" for row in table]
     lines += ["", "The whole of it: artefact `report.html`."]
-    return "\n".join([story.note, *lines])
+    return "\n".join([*lines, "", story.note])
 
 
 def _stage_notes(root: Path) -> dict[str, str]:
