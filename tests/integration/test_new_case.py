@@ -203,7 +203,7 @@ def test_bags_are_read_by_their_odometry(root, folder, capsys):
     assert bag.fields["position_x"] == "/odom:pose.pose.position.x"
     assert bag.fields["linear_acceleration_x"] == "/imu/data:linear_acceleration.x"
     assert "position_z" not in bag.fields
-    assert (case.rate_hz, case.source.resample) == (10.0, "hold")
+    assert (case.rate_hz, case.source.resample) == (10.0, "thin")
     assert case.pose.heading == ["orientation_z", "orientation_w"]
     units = {channel.name: channel.unit for channel in case.channels}
     assert units["angular_velocity_z"] == "rad/s"

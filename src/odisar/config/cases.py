@@ -53,8 +53,9 @@ class Source(Section):
     ``maker`` says what makes them where they are missing: a simulator, a download, or nothing
     (they are yours). ``csv`` and ``bag`` (see ``config.formats``) say how such files are read;
     ``bag`` may be null where there are none. ``resample: hold`` puts every recording on a grid of
-    ``rate_hz``, holding the last sample (so that nothing looks ahead); ``none`` takes the samples
-    as they are recorded.
+    ``rate_hz``, holding the last sample (so that nothing looks ahead); ``thin`` keeps the samples
+    that this grid would hold with their own stamps, which a relative pose needs; ``none`` takes
+    all samples as they are recorded.
     """
 
     folder: str
@@ -63,7 +64,7 @@ class Source(Section):
     max_recordings: PositiveInt
     csv: CsvFormat
     bag: BagFormat | None
-    resample: Literal["none", "hold"]
+    resample: Literal["none", "hold", "thin"]
 
 
 class Pose(Section):
@@ -252,13 +253,20 @@ class Case(Section):
             return
         if len(set(self.pose.channels)) < len(self.pose.channels):
             raise ValueError("pose: a channel is named twice")
+        if self.pose.coordinates == "relative" and self.source.resample == "hold":
+            raise ValueError(
+                "source.resample: hold loses the stamps by which the increments of a relative pose "
+                "are divided; set it to thin (or pose.coordinates to absolute)"
+            )
         by_name = {channel.name: channel for channel in self.channels}
+        if len({by_name[name].output for name in self.pose.heading}) > 1:
+            raise ValueError("pose.heading: z and w of a quaternion are both outputs, or neither")
         commands = [name for name in self.pose.channels if by_name[name].role == "command"]
         if commands:
             raise ValueError(f"pose: {', '.join(commands)} must be states, not commands")
         if len(self.pose.heading) == 1:
             unit = by_name[self.pose.heading[0]].unit
-            if not unit.casefold().startswith(("rad", "deg", "°")):
+            if "/" in unit or not unit.casefold().startswith(("rad", "deg", "°")):
                 raise ValueError(
                     f"pose.heading: {self.pose.heading[0]!r} is in {unit!r}; an angle is in rad or "
                     "deg (or name z and w of a quaternion)"

@@ -50,6 +50,10 @@ class BagFormat(Section):
     (``stamp: header``) or of its arrival (``received``). ``fields`` says, by channel, which field
     of which topic's messages is its value. A channel of another topic takes the last value at or
     before the sample, no older than ``max_age_s``.
+
+    With ``stamp: header`` "before" goes by the stamps: a sample takes a value that was measured
+    before it, which a live monitor may get only later. Use ``received`` for samples of what had
+    arrived by then.
     """
 
     stamp_topic: Annotated[str, Field(pattern=r"^/[\w/]+$")]

@@ -7,19 +7,23 @@ from pydantic import Field, model_validator
 from odisar.config.base import Section
 from odisar.config.cases import PositiveFloat, PositiveInt
 
-Choices = Annotated[list[PositiveInt], Field(min_length=1)]
+# Far above any sensible twin: what a file that was meddled with may ask for has an end.
+ModelDim = Annotated[int, Field(gt=0, le=4096)]
+HiddenDim = Annotated[int, Field(gt=0, le=16_384)]
+Count = Annotated[int, Field(gt=0, le=64)]
+Steps = Annotated[int, Field(gt=0, le=100_000)]
 DropoutRate = Annotated[float, Field(ge=0, lt=1)]
 
 
 class TwinConfig(Section):
     """Shape of the Transformer (paper, Table "Model and Training Parameters")."""
 
-    patch_steps: PositiveInt
-    model_dim: PositiveInt
-    heads: PositiveInt
-    layers: PositiveInt
-    feedforward_dim: PositiveInt
-    reconstruction_dim: PositiveInt
+    patch_steps: Steps
+    model_dim: ModelDim
+    heads: Count
+    layers: Count
+    feedforward_dim: HiddenDim
+    reconstruction_dim: HiddenDim
     dropout: DropoutRate
     detach_reconstruction: bool
 
@@ -69,9 +73,9 @@ class TuningConfig(Section):
     reports_per_trial: PositiveInt
     pruner_warmup_trials: PositiveInt
     learning_rate: LearningRateRange
-    model_dim: Choices
-    layers: Choices
-    feedforward_dim: Choices
+    model_dim: Annotated[list[ModelDim], Field(min_length=1)]
+    layers: Annotated[list[Count], Field(min_length=1)]
+    feedforward_dim: Annotated[list[HiddenDim], Field(min_length=1)]
     storage: Annotated[str, Field(pattern=r"^journal$|^[a-z0-9+]+://")]
 
     @model_validator(mode="after")

@@ -4,7 +4,6 @@ import shutil
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
 import torch
 from pydantic import ValidationError
 
@@ -61,7 +60,8 @@ def read_bundle(folder: Path) -> Deployed:
     """Read a bundle and return what it deploys.
 
     Nothing is unpickled or executed. Raises OdisarError, naming the file and the way out, where
-    the manifest or a file is not as written, or the parts do not fit each other.
+    the manifest or a file is not as written, the parts do not fit each other, or the example is
+    not assessed.
     """
     manifest = read_manifest(folder)
     settings = _read(folder / CAPABILITY_FILE, CapabilitySettings)
@@ -74,7 +74,9 @@ def read_bundle(folder: Path) -> Deployed:
         )
     twin = _read_twin(folder)
     _check_fit(folder, twin, case)
-    return Deployed(twin, case, settings, manifest, example)
+    deployed = Deployed(twin, case, settings, manifest, example)
+    _check_example(folder, deployed)
+    return deployed
 
 
 def _read(path: Path, kind: type[Model]) -> Model:
@@ -85,6 +87,10 @@ def _read(path: Path, kind: type[Model]) -> Model:
         raise OdisarError(
             f"{path}: {first_problem(error)}; write the bundle again with this odisar"
         ) from error
+    except ArithmeticError as error:
+        raise OdisarError(
+            f"{path}: a number is too large ({error}); write the bundle again"
+        ) from error
 
 
 def _read_twin(folder: Path) -> TrainedTwin:
@@ -94,13 +100,10 @@ def _read_twin(folder: Path) -> TrainedTwin:
         # What read_twin advises is for the pipeline's own folders.
         reason = str(error).partition("; run the train stage")[0]
         raise OdisarError(f"{reason}; write the bundle again") from error
-    except (TypeError, AttributeError, IndexError) as error:  # JSON of another shape
-        reason = f"{folder}: not a trained twin ({error})"
-        raise OdisarError(f"{reason}; write the bundle again") from error
 
 
 def _check_fit(folder: Path, twin: TrainedTwin, case: Case) -> None:
-    """Raise where twin and case do not belong together, or the twin holds what is no number."""
+    """Raise where twin and case do not belong together, or the weights hold what is no number."""
     for what, of_twin, of_case in (
         ("channels", list(twin.channel_names), case.channel_names),
         ("outputs", list(twin.spec.outputs), case.output_indices),
@@ -114,11 +117,19 @@ def _check_fit(folder: Path, twin: TrainedTwin, case: Case) -> None:
                 f"{folder}: twin.json and {CASE_FILE} differ in {what}: {of_twin} and {of_case}; "
                 "write the bundle again from one run of the pipeline"
             )
-    scaling = [values for values in vars(twin.scaler).values() if values is not None]
-    numbers = [*twin.network.state_dict().values(), *map(torch.as_tensor, scaling)]
-    if not all(bool(torch.isfinite(part).all()) for part in numbers):
+    if not all(bool(torch.isfinite(part).all()) for part in twin.network.state_dict().values()):
+        raise OdisarError(f"{folder}: weights.safetensors holds NaN or infinity; train it again")
+
+
+def _check_example(folder: Path, deployed: Deployed) -> None:
+    """Raise where the bundle cannot assess its own example."""
+    try:
+        said = deployed.assess(deployed.example)
+    except (OdisarError, ValueError, ArithmeticError, RuntimeError) as error:
         raise OdisarError(
-            f"{folder}: weights or scaling of the twin hold NaN or infinity; train it again"
+            f"{folder / EXAMPLE_FILE} is not assessed: {error}; write the bundle again"
+        ) from error
+    if said.empty:
+        raise OdisarError(
+            f"{folder / EXAMPLE_FILE} is shorter than a window; write the bundle again"
         )
-    if any(np.any(v <= 0) for name, v in vars(twin.scaler).items() if name.endswith("std")):
-        raise OdisarError(f"{folder}: twin.json: a standard deviation is not above 0; train again")

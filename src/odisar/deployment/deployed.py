@@ -2,11 +2,11 @@
 
 import json
 from threading import Lock
-from typing import Annotated
+from typing import Annotated, Self
 
 import pandas as pd
 import torch
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from odisar.capability.assessment import (
     Assessment,
@@ -59,6 +59,13 @@ class Example(Section):
 
     columns: Annotated[list[str], Field(min_length=1)]
     data: Annotated[list[list[float]], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for i, row in enumerate(self.data):
+            if len(row) != len(self.columns):
+                raise ValueError(f"row {i} has {len(row)} values, not {len(self.columns)}")
+        return self
 
     @property
     def table(self) -> pd.DataFrame:

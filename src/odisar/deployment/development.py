@@ -25,8 +25,8 @@ class DevelopmentScore:
 
     ``auroc`` is None where the development recordings hold no disturbed or no undisturbed sample,
     the interval (over recordings that vary together) also where there is only one cluster.
-    ``measured_on`` is a hash of the recordings and of which of their windows were scored: two
-    scores can be compared where it is the same.
+    ``measured_on`` is a hash of the recordings and of the positions that were scored (they depend
+    on context and horizon): two scores can be compared where it is the same.
     """
 
     auroc: float | None
@@ -60,7 +60,8 @@ def measure(
     segment, where the forecast errors have a score as well.
     """
     judged = judged_recordings(recordings, case)
-    parts = [_score(scorer, item, stride_steps) for item in judged]
+    positions = [_positions(scorer, item, stride_steps) for item in judged]
+    parts = [_score(scorer, *pair) for pair in zip(judged, positions, strict=True)]
     scores = np.concatenate([np.empty(0), *(part[0] for part in parts)])
     labels = np.concatenate([np.empty(0, dtype=bool), *(part[1] for part in parts)])
     auroc = float(auroc_of_counts(*count_levels(scores, labels)))
@@ -85,17 +86,15 @@ def measure(
         ci_high=_known(high),
         recordings=len(judged),
         windows=len(scores),
-        measured_on=_hash(judged, stride_steps),
+        measured_on=_hash(judged, positions, stride_steps),
     )
 
 
-def _score(
-    scorer: Scorer, recording: Recording, stride_steps: int
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return (window,) scores and labels at every ``stride_steps``-th judged position."""
+def _positions(scorer: Scorer, recording: Recording, stride_steps: int) -> NDArray[np.int64]:
+    """Return (window,) every ``stride_steps``-th judged position."""
     spec = scorer.twin.spec
     ahead = spec.horizon_steps if spec.known_ahead else 0
-    positions = np.concatenate(
+    return np.concatenate(
         [
             spec.issue_positions(segment, 1, horizon_steps=ahead)[
                 spec.horizon_steps :: stride_steps
@@ -103,6 +102,12 @@ def _score(
             for segment in recording.segments
         ]
     )
+
+
+def _score(
+    scorer: Scorer, recording: Recording, positions: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return (window,) scores and labels at the positions."""
     if positions.size == 0:
         return np.empty(0), np.empty(0, dtype=bool)
     output = scorer.forecast(recording, positions)
@@ -111,12 +116,15 @@ def _score(
     return reconstruction_error(errors).astype(np.float64), labels
 
 
-def _hash(recordings: Sequence[Recording], stride_steps: int) -> str:
+def _hash(
+    recordings: Sequence[Recording], positions: Sequence[NDArray[np.int64]], stride_steps: int
+) -> str:
     digest = hashlib.sha256(f"stride {stride_steps}".encode())
-    for item in recordings:
+    for item, scored in zip(recordings, positions, strict=True):
         digest.update(f"\0{item.name}\0{item.segments}\0{item.intervals}\0".encode())
         for values in (item.time_s, item.values):
             digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+        digest.update(np.ascontiguousarray(scored, dtype="<i8").tobytes())
     return digest.hexdigest()
 
 

@@ -1,5 +1,6 @@
 """From a plain table of samples to recordings, by the checks that the reader makes of files."""
 
+from collections import Counter
 from collections.abc import Sequence
 from numbers import Real
 
@@ -11,7 +12,7 @@ from odisar.config.cases import Case
 from odisar.errors import OdisarError
 from odisar.recordings.checks import check_table
 from odisar.recordings.quality import ROWS_LISTED, Finding, Notes
-from odisar.recordings.resampling import hold_segments
+from odisar.recordings.resampling import resample_segments
 from odisar.recordings.schema import Recording, RecordingInfo
 from odisar.recordings.table import PARQUET, Table, closest
 
@@ -22,6 +23,8 @@ UNNAMED = "samples"
 
 _SHOWN = 60
 _LISTED = 20
+#: A table may have this many columns more than it should; the message can name what is wrong.
+_SURPLUS_COLUMNS = 100
 
 FloatArray = NDArray[np.float64]
 
@@ -67,12 +70,18 @@ def _checked_shape(table: object, case: Case, max_rows: int) -> pd.DataFrame:
             "send dataframe_split or dataframe_records"
         )
     wanted = _sample_columns(case)
+    if len(table.columns) > len(wanted) + _SURPLUS_COLUMNS:
+        raise OdisarError(
+            f"the table has {len(table.columns)} columns, far more than the {len(wanted)} of the "
+            f"case; send {_shown(wanted)}"
+        )
     given = [str(name) for name in table.columns]
-    repeated = sorted({name for name in given if given.count(name) > 1})
+    repeated = sorted(name for name, count in Counter(given).items() if count > 1)
     if repeated:
         raise OdisarError(f"the table has the column {_shown(repeated)} more than once; keep one")
-    missing = [name for name in wanted if name not in given]
-    unknown = [name for name in given if name not in (*wanted, RECORDING_COLUMN)]
+    known, present = {*wanted, RECORDING_COLUMN}, set(given)
+    missing = [name for name in wanted if name not in present]
+    unknown = [name for name in given if name not in known]
     if missing or unknown:
         raise OdisarError(_wrong_columns(missing, unknown, wanted))
     if len(table) == 0:
@@ -88,7 +97,9 @@ def _checked_shape(table: object, case: Case, max_rows: int) -> pd.DataFrame:
 def _wrong_columns(missing: Sequence[str], unknown: Sequence[str], wanted: Sequence[str]) -> str:
     parts = [f"lacks the column {_shown(missing)}"] if missing else []
     parts += [f"has the unknown column {_shown(unknown)}"] if unknown else []
-    hints = [(close, name) for name in missing if (close := closest(name, unknown))]
+    # Comparing takes long where names are long or many.
+    alike = [name for name in unknown if len(name) <= _SHOWN]
+    hints = [(close, name) for name in missing[:_LISTED] if (close := closest(name, alike))]
     renames = [f"rename {_short(close)!r} to {name!r}" for close, name in hints]
     allowed = f"send {_shown(wanted)} and nothing else but {RECORDING_COLUMN!r}, which is optional"
     return f"the table {' and '.join(parts)}; {'; '.join([*renames, allowed])}"
@@ -164,8 +175,10 @@ def _recording(
         return None
     time_s = np.ascontiguousarray(values[:, 0])
     samples = np.ascontiguousarray(values[:, 1:])
-    if case.source.resample == "hold":
-        time_s, samples, segments = hold_segments(time_s, samples, segments, case.rate_hz)
+    if case.source.resample != "none":
+        time_s, samples, segments = resample_segments(
+            time_s, samples, segments, case.rate_hz, case.source.resample
+        )
     return Recording(name, RecordingInfo(case_name), time_s, samples, segments=segments)
 
 
@@ -194,7 +207,7 @@ def _raise(found: Sequence[Finding]) -> None:
 
 
 def _sentence(finding: Finding) -> str:
-    place = [f"recording {finding.file!r}"] if finding.file not in ("", UNNAMED) else []
+    place = [f"recording {_short(finding.file)!r}"] if finding.file not in ("", UNNAMED) else []
     place += [f"column {finding.column!r}"] if finding.column else []
     place += [f"row {finding.row}"] if finding.row is not None else []
     value = f" ({_short(finding.value)})" if finding.value else ""

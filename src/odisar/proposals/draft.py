@@ -131,7 +131,10 @@ def _source(draft: Draft) -> Iterator[str]:
         yield line(at, "resample: none")
         return
     why = "stamps are uneven" if draft.pace.rate_hz == draft.rate_hz else "fewer than recorded"
-    yield line(at, "resample: hold", f"{why}: each step holds the last sample")
+    if draft.pose is not None:
+        yield line(at, "resample: thin", f"{why}: the last sample of each period, with its stamp")
+    else:
+        yield line(at, "resample: hold", f"{why}: each step holds the last sample")
 
 
 def _bag(draft: Draft, bag: BagLook) -> Iterator[str]:

@@ -67,7 +67,7 @@ def _summary(case: Case, result: ReadResult) -> str:
     sound, files = len(result.recordings), len(result.files)
     samples = sum(len(recording.time_s) for recording in result.recordings)
     hours = samples / case.rate_hz / 3600.0
-    rate = f"{case.rate_hz:g} Hz, resampled" if case.source.resample == "hold" else _rates(result)
+    rate = f"{case.rate_hz:g} Hz, resampled" if case.source.resample != "none" else _rates(result)
     return (
         f"{sound} of {plural(files, 'recording')} can be used: {hours:.3g} h, "
         f"{plural(samples, 'sample')}, {rate or f'{case.rate_hz:g} Hz declared'}"

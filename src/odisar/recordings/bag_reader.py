@@ -1,28 +1,26 @@
 """Read one ROS 2 bag into numbers: a sample for each message of one topic."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-import pyarrow as pa  # type: ignore[import-untyped]
-from rosbags.interfaces import Connection, TopicInfo
+from rosbags.interfaces import Connection, MessageDefinitionFormat, TopicInfo
 from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.reader import DirectoryReader
 
 from odisar.config.cases import Case
 from odisar.config.formats import BagFormat
-from odisar.recordings.bag_fields import FieldFaultError, split_path
+from odisar.recordings.bag_definitions import FieldFaultError
+from odisar.recordings.bag_fields import split_path
 from odisar.recordings.bag_samples import make_samples
+from odisar.recordings.bag_storage import REINDEX, decompressed, is_complete, note_damage
 from odisar.recordings.bag_topic import TopicReader
-from odisar.recordings.file_checks import check_size, note_unreadable
-from odisar.recordings.folder import BAG_METADATA, bag_files
+from odisar.recordings.file_checks import check_size
 from odisar.recordings.quality import Notes
 from odisar.recordings.table import Table, closest, listed
 
-_REINDEX = "run `ros2 bag reindex` on it, or record again"
-_CHUNK_BYTES = 1024**2
-_REPAIR = (
-    "copy or record it again, or repair it (sqlite3 .recover, mcap recover; then "
-    "`ros2 bag reindex`)"
-)
+# Nanoseconds since 1970 that a 64-bit integer holds: until the year 2262.
+_LAST_NS = 2**63 - 1
 
 
 def read_bag(path: Path, case: Case, notes: Notes) -> Table | None:
@@ -31,110 +29,18 @@ def read_bag(path: Path, case: Case, notes: Notes) -> Table | None:
     ``path`` is the folder of a bag, or a file of messages (SQLite or MCAP) by itself. Messages
     are numbered from 1, as the bag gives them. Everything wrong goes to ``notes``.
     """
-    if not _is_complete(path, notes):
+    if not is_complete(path, notes):
         return None
     try:
         reader = Reader(path)
         reader.open()
     except Exception as fault:  # noqa: BLE001 - a damaged bag makes rosbags raise anything
-        _note_damage(path, fault, None, notes)
+        note_damage(path, fault, None, notes)
         return None
     try:
         return _read(reader, path, case, notes)
     finally:
         reader.close()
-
-
-def _is_complete(path: Path, notes: Notes) -> bool:
-    """Return whether a bag has its metadata and no messages outside of its files."""
-    try:
-        if path.is_dir():
-            return _is_complete_folder(path, notes)
-        size = path.stat().st_size
-    except OSError as fault:
-        note_unreadable(fault, notes)
-        return False
-    if not size:
-        notes.error("the file is empty", "record it again, or remove it")
-        return False
-    return _is_finished(path, notes)
-
-
-def _is_complete_folder(path: Path, notes: Notes) -> bool:
-    files = bag_files(path)
-    metadata = path / BAG_METADATA
-    if not metadata.exists():
-        alone = f", or move {files[0].name} out of its folder" if len(files) == 1 else ""
-        notes.error(f"the bag has no {BAG_METADATA}", f"{_REINDEX}{alone}")
-        return False
-    text = metadata.read_text(encoding="utf-8", errors="replace")
-    for file in files:
-        if file.name not in text:
-            problem = f"a file that {BAG_METADATA} does not list is not read"
-            notes.warning(problem, f"{_REINDEX}, or remove the file", value=file.name)
-    unfinished = [file for file in files if not _is_finished(file, notes)]
-    return not unfinished
-
-
-def _is_finished(file: Path, notes: Notes) -> bool:
-    """Return whether SQLite can open the file, which is whole and holds all that was recorded."""
-    if file.suffix != ".db3":
-        return True
-    journal = file.with_name(f"{file.name}-wal")
-    if set("?#%") & set(str(file)):
-        problem = "SQLite cannot open a file with ?, # or % in its path"
-        notes.error(problem, "rename the file or its folder", value=file.name)
-    elif journal.exists() and journal.stat().st_size:
-        notes.error(
-            "the recorder did not finish: messages lie in a journal beside the file",
-            f"put them into it: sqlite3 {file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'",
-            value=journal.name,
-        )
-    elif file.stat().st_size < _stated_size(file):
-        value = f"{file.stat().st_size} of {_stated_size(file)} bytes"
-        notes.error(f"{file.name} is cut off or damaged", _REPAIR, value=value)
-    else:
-        return True
-    return False
-
-
-def _stated_size(file: Path) -> int:
-    """Return the size that the header of an SQLite file states, 0 if it states none."""
-    with file.open("rb") as opened:
-        header = opened.read(100)
-    # https://www.sqlite.org/fileformat.html, 1.3: the size counts if both counters are equal.
-    if len(header) < 100 or header[24:28] != header[92:96]:
-        return 0
-    page = int.from_bytes(header[16:18])
-    return (65536 if page == 1 else page) * int.from_bytes(header[28:32])
-
-
-def _note_damage(path: Path, fault: Exception, row: int | None, notes: Notes) -> None:
-    """Note why a bag cannot be read (on), and which of its files is to blame."""
-    reason = " ".join(str(fault).replace(f"{path.parent}/", "").split()) or type(fault).__name__
-    if not path.is_dir():
-        notes.error(f"{path.name} is cut off or damaged", _REPAIR, row=row, value=reason)
-        return
-    damaged = next((file.name for file in bag_files(path) if not _is_readable(file)), None)
-    if damaged is None:
-        notes.error(f"the bag does not fit its {BAG_METADATA}", _REINDEX, row=row, value=reason)
-        return
-    notes.error(f"{damaged} is cut off or damaged", _REPAIR, row=row, value=reason)
-
-
-def _is_readable(file: Path) -> bool:
-    try:
-        if file.suffix == ".zstd":
-            with pa.input_stream(file, compression="zstd") as stream:
-                while stream.read(_CHUNK_BYTES):
-                    pass
-            return True
-        with Reader(file) as reader:
-            for _ in reader.messages():
-                pass
-    except Exception:  # noqa: BLE001 - see read_bag
-        return False
-    return True
 
 
 def _read(reader: Reader, path: Path, case: Case, notes: Notes) -> Table | None:
@@ -147,7 +53,7 @@ def _read(reader: Reader, path: Path, case: Case, notes: Notes) -> Table | None:
             f"{_described(topics)}",
         )
         return None
-    readers = _topic_readers(topics, layout, notes)
+    readers = _topic_readers(reader, topics, layout, notes)
     stamp_reader = readers.get(layout.stamp_topic)
     if stamp_reader is None:
         return None
@@ -174,7 +80,7 @@ def _described(topics: Mapping[str, TopicInfo], first: str | None = None) -> str
 
 
 def _topic_readers(
-    topics: Mapping[str, TopicInfo], layout: BagFormat, notes: Notes
+    reader: Reader, topics: Mapping[str, TopicInfo], layout: BagFormat, notes: Notes
 ) -> dict[str, TopicReader]:
     """Return a reader for each topic that is there and understood; note the others."""
     wanted: dict[str, dict[str, str]] = {layout.stamp_topic: {}}
@@ -184,7 +90,7 @@ def _topic_readers(
     readers: dict[str, TopicReader] = {}
     for topic, paths in wanted.items():
         connection = _connection(topic, topics, notes)
-        if connection is None:
+        if connection is None or not _has_one_definition(reader, topic, notes):
             continue
         try:
             readers[topic] = TopicReader(connection, paths, layout.stamp, notes)
@@ -222,6 +128,30 @@ def _connection(topic: str, topics: Mapping[str, TopicInfo], notes: Notes) -> Co
     return info.connections[0]
 
 
+def _storages(reader: Reader) -> Sequence[Any]:
+    """Return rosbags' readers of the files of messages: several in a folder, else one."""
+    if isinstance(reader.storage, DirectoryReader):
+        return reader.storage.storages
+    return [reader.storage]
+
+
+def _has_one_definition(reader: Reader, topic: str, notes: Notes) -> bool:
+    """Return whether all messages of a topic, in all files, were made with one definition."""
+    found = [item for one in _storages(reader) for item in one.connections if item.topic == topic]
+    # A file without definitions says nothing about them.
+    texts = {item.msgdef for item in found if item.msgdef.format != MessageDefinitionFormat.NONE}
+    digests = {item.digest for item in found if item.digest}
+    if len(texts) <= 1 and len(digests) <= 1:
+        return True
+    notes.error(
+        "the topic has messages of several definitions",
+        "cut the bag, or record again with one version of the message on the topic",
+        column=topic,
+        value=f"{max(len(texts), len(digests))} definitions of {found[0].msgtype}",
+    )
+    return False
+
+
 def _collect(
     reader: Reader,
     connections: list[Connection],
@@ -234,16 +164,41 @@ def _collect(
     stamp_reader = readers[layout.stamp_topic]
     size = 0
     try:
-        for connection, received_ns, raw in reader.messages(connections):
+        for connection, received_ns, raw in _messages(reader, connections):
             size += len(raw)
             row = len(stamp_reader) + 1
             if not check_size(size, "part of the bag that is read", notes, row):
                 return False
-            readers[connection.topic].add(received_ns, raw)
+            topic_reader = readers[connection.topic]
+            if not isinstance(received_ns, int) or not 0 <= received_ns <= _LAST_NS:
+                notes.error(
+                    "the time of arrival is no whole number of nanoseconds since 1970",
+                    "record or convert the bag again",
+                    column=connection.topic,
+                    row=len(topic_reader) + 1,
+                    value=repr(received_ns),
+                )
+                return False
+            topic_reader.add(received_ns, raw)
     except Exception as fault:  # noqa: BLE001 - see read_bag
-        _note_damage(path, fault, len(stamp_reader) + 1, notes)
+        note_damage(path, fault, len(stamp_reader) + 1, notes)
         return False
     return True
+
+
+def _messages(
+    reader: Reader, connections: list[Connection]
+) -> Iterator[tuple[Connection, int, bytes]]:
+    """Yield the messages; those that are compressed one by one only up to the limit of a file."""
+    storage = reader.storage
+    if storage.metadata.compression_mode != "message":
+        yield from reader.messages(connections)
+        return
+    assert isinstance(storage, DirectoryReader)  # noqa: S101 - nothing else has a mode
+    # rosbags would decompress without a limit: it is told that there is nothing to decompress.
+    storage.metadata = storage.metadata._replace(compression_mode=None)
+    for connection, received_ns, raw in reader.messages(connections):
+        yield connection, received_ns, decompressed(raw)
 
 
 def _check_counts(
@@ -255,14 +210,14 @@ def _check_counts(
         if found < counted:
             notes.error(
                 "messages that the bag's metadata counts are missing",
-                _REINDEX,
+                REINDEX,
                 column=topic,
                 value=f"{counted - found} of {counted}",
             )
         elif found > counted:
             notes.warning(
                 "the bag's metadata counts fewer messages than there are: all are read",
-                _REINDEX,
+                REINDEX,
                 column=topic,
                 value=f"{counted} of {found}",
             )

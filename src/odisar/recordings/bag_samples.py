@@ -26,6 +26,9 @@ def make_samples(
     if not all(one.dated for one in series.values()):
         return None
     stamps = series[layout.stamp_topic]
+    for topic, reader in readers.items():
+        if topic != layout.stamp_topic:  # whose times are checked as those of any recording
+            reader.check_order(series[topic])
     heard = {
         topic: _last_heard(stamps.stamps_ns, other)
         for topic, other in series.items()

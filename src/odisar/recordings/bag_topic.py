@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import Connection
 
-from odisar.recordings.bag_fields import FieldFaultError, Getter, definitions, has_header, resolve
+from odisar.recordings.bag_definitions import FieldFaultError, definitions
+from odisar.recordings.bag_fields import Getter, has_header, resolve
 from odisar.recordings.quality import Notes
+from odisar.recordings.table import BAG, note_rows
 
 _NANOSECONDS = 1_000_000_000
 
@@ -20,8 +22,8 @@ class Series:
 
     ``stamps_ns`` (message,) are on the chosen clock; ``values`` (message, channel) are NaN where
     ``sound`` (message, channel) is false: that is in the notes already. ``decoded`` (message,) is
-    false where a message told nothing, not even its time; ``dated`` is false where no message
-    ever filled in its header's stamp.
+    false where a message told nothing, not even its time; ``dated`` is false where a message's
+    header has no stamp.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -103,23 +105,63 @@ class TopicReader:
         self._decoded.append(decoded)
 
     def series(self) -> Series:
-        """Return all messages so far; stamps that are never filled in go to the notes."""
+        """Return all messages so far; stamps that are not filled in go to the notes."""
         stamps_ns = np.array(self._stamps, dtype=np.int64)
         decoded = np.array(self._decoded, dtype=bool)
         shape = (len(stamps_ns), len(self._getters))
         sound = np.ones(shape, dtype=bool)
         for row, place in self._unsound:
             sound[row, place] = False
-        dated = not self._by_header or not decoded.any() or bool(stamps_ns[decoded].any())
-        if not dated:
+        dated = not self._by_header or self._is_dated(stamps_ns, decoded)
+        values = np.array(self._values, dtype=np.float64).reshape(shape)
+        return Series(stamps_ns, values, sound, decoded, dated)
+
+    def _is_dated(self, stamps_ns: NDArray[np.int64], decoded: NDArray[np.bool_]) -> bool:
+        """Return whether every header has a stamp; note those that have none."""
+        blank = decoded & (stamps_ns == 0)
+        if not blank.any():
+            return True
+        if blank[decoded].all():
             self._notes.error(
                 "the stamp of every header is 0",
                 "set source.bag.stamp: received, or mend the driver: it does not fill the header",
                 column=self.topic,
                 value="0",
             )
-        values = np.array(self._values, dtype=np.float64).reshape(shape)
-        return Series(stamps_ns, values, sound, decoded, dated)
+            return False
+        rows = np.flatnonzero(blank) + 1
+        note_rows(
+            self._notes,
+            "error",
+            self.topic,
+            "the stamp of the header is 0",
+            "set source.bag.stamp: received, or trim the first messages",
+            rows,
+            np.zeros(len(rows)),
+        )
+        return False
+
+    def check_order(self, series: Series) -> None:
+        """Note where the clock in the headers jumps back: its later messages would seem earlier.
+
+        Times of arrival need no check: a bag has its messages in the order of those.
+        """
+        if not self._by_header:
+            return
+        usable = np.flatnonzero(series.decoded)
+        stamps_ns = series.stamps_ns[usable]
+        back = np.flatnonzero(np.diff(stamps_ns) < 0) + 1
+        if len(back):
+            rows, stamps_s = usable[back] + 1, stamps_ns[back] / _NANOSECONDS
+            note_rows(
+                self._notes,
+                "error",
+                self.topic,
+                "the time goes back",
+                BAG.backward,
+                rows,
+                stamps_s,
+            )
 
 
 def _stamp(message: Any) -> int:

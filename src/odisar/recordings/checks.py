@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odisar.config.cases import Case, Channel
+from odisar.recordings.heading_checks import check_heading
 from odisar.recordings.quality import Notes
-from odisar.recordings.resampling import grid_steps
+from odisar.recordings.resampling import held_samples, rounding_periods
 from odisar.recordings.table import Advice, Table, note_rows
 
 #: A measured rate this far from the declared one is another rate, not a drifting clock.
@@ -35,6 +36,7 @@ def check_table(table: Table, case: Case, notes: Notes) -> Segments:
     for i, channel in enumerate(case.channels, start=1):
         if table.present[i]:
             _check_channel(table, i, channel, notes)
+    check_heading(table, case, notes)
     if not table.present[0]:
         return ()
     segments = check_times(table, case, notes)
@@ -118,7 +120,7 @@ def check_times(table: Table, case: Case, notes: Notes) -> Segments:
             note_rows(notes, "error", name, problem, remedy, lines[at], time_s[at])
     # A line that could not be read is not a gap: its error is in the notes.
     adjoining = (np.diff(known) == 1) & (steps_s > 0)
-    if not adjoining.any() or not _check_pace(steps_s, adjoining, lines[after], case, notes):
+    if not adjoining.any() or not _check_pace(time_s[known], adjoining, lines[after], case, notes):
         return whole
     gaps = adjoining & (steps_s > case.max_gap_s)
     if not gaps.any():
@@ -137,18 +139,23 @@ def check_times(table: Table, case: Case, notes: Notes) -> Segments:
 
 
 def _check_pace(
-    steps_s: NDArray[np.float64],
+    time_s: NDArray[np.float64],
     adjoining: NDArray[np.bool_],
     lines: NDArray[np.int64],
     case: Case,
     notes: Notes,
 ) -> bool:
     """Return whether the samples come as the case says, or faster where they are resampled."""
-    if case.source.resample == "hold":
-        return _check_not_slower(steps_s[adjoining], case, notes)
-    if not _check_rate(steps_s[adjoining], case, notes):
+    steps_s = np.diff(time_s)
+    held = case.source.resample != "none"
+    check = _check_not_slower if held else _check_rate
+    if not check(steps_s[adjoining], case, notes):
         return False
-    _check_jitter(steps_s, adjoining, lines, case, notes)
+    # The rounding of written times is kept out of the comparison.
+    slack_s = rounding_periods(time_s, case.rate_hz) / case.rate_hz
+    if not held:
+        _check_dense(steps_s, adjoining, lines, slack_s, case, notes)
+    _check_sparse(steps_s, adjoining, lines, slack_s, case, notes)
     return True
 
 
@@ -159,7 +166,7 @@ def _check_not_slower(steps_s: NDArray[np.float64], case: Case, notes: Notes) ->
     notes.error(
         f"the recording is slower than rate_hz={case.rate_hz:g}",
         _other_unit(measured_hz, case)
-        or "lower the case's rate_hz (and its steps): source.resample: hold would invent samples",
+        or "lower the case's rate_hz (and its steps): resampling would invent samples",
         column=case.source.time_column,
         value=f"{measured_hz:.4g} Hz",
     )
@@ -187,7 +194,7 @@ def _check_rate(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
     if abs(measured_hz / case.rate_hz - 1.0) <= tolerance:
         return True
     faster = measured_hz > case.rate_hz
-    resample = "set source.resample: hold" if faster else "resample the recording"
+    resample = "set source.resample to hold or thin" if faster else "resample the recording"
     notes.error(
         f"the rate is not rate_hz={case.rate_hz:g}",
         _other_unit(measured_hz, case)
@@ -198,35 +205,47 @@ def _check_rate(steps_s: NDArray[np.float64], case: Case, notes: Notes) -> bool:
     return False
 
 
-def _check_jitter(
+def _check_dense(
     steps_s: NDArray[np.float64],
     adjoining: NDArray[np.bool_],
     lines: NDArray[np.int64],
+    slack_s: float,
     case: Case,
     notes: Notes,
 ) -> None:
-    name, period_s = case.source.time_column, 1.0 / case.rate_hz
-    # A millionth of a period keeps the rounding of written times out of the comparison.
-    slack_s = 1e-6 * period_s
-    dense = adjoining & (steps_s < 0.5 * period_s - slack_s)
+    dense = adjoining & (steps_s < 0.5 / case.rate_hz - slack_s)
     if dense.any():
         note_rows(
             notes,
             "error",
-            name,
+            case.source.time_column,
             "the step is shorter than half a period",
             "remove the sample between the samples, or resample the recording",
             lines[dense],
             steps_s[dense],
         )
-    sparse = adjoining & (steps_s > 1.5 * period_s + slack_s) & (steps_s <= case.max_gap_s)
+
+
+def _check_sparse(
+    steps_s: NDArray[np.float64],
+    adjoining: NDArray[np.bool_],
+    lines: NDArray[np.int64],
+    slack_s: float,
+    case: Case,
+    notes: Notes,
+) -> None:
+    longest_s = 1.5 / case.rate_hz
+    sparse = adjoining & (steps_s > longest_s + slack_s) & (steps_s <= case.max_gap_s)
     if sparse.any():
+        crossed = "windows cross it"
+        if case.source.resample == "hold":
+            crossed = f"the last sample is held over up to {steps_s[sparse].max():.6g} s"
         note_rows(
             notes,
             "warning",
-            name,
-            f"a sample is missing, within max_gap_s={case.max_gap_s:g}: windows cross it",
-            f"set the case's max_gap_s to {1.5 * period_s:g} to keep windows from crossing it",
+            case.source.time_column,
+            f"a sample is missing, within max_gap_s={case.max_gap_s:g}: {crossed}",
+            f"set the case's max_gap_s to {longest_s:g} to keep windows from crossing it",
             lines[sparse],
             steps_s[sparse],
         )
@@ -260,5 +279,7 @@ def _check_lengths(segments: Segments, table: Table, case: Case, notes: Notes) -
 
 def _length(time_s: NDArray[np.float64], case: Case) -> int:
     """Return the number of samples of a segment, after resampling where it is resampled."""
-    on_grid = case.source.resample == "hold" and bool((np.diff(time_s) > 0).all())
-    return grid_steps(time_s, case.rate_hz) if on_grid else len(time_s)
+    if case.source.resample == "none" or not (np.diff(time_s) > 0).all():
+        return len(time_s)
+    held = held_samples(time_s, case.rate_hz)
+    return len(held) if case.source.resample == "hold" else len(np.unique(held))

@@ -146,5 +146,8 @@ def _read_clean(text: str, names: Sequence[str], layout: CsvFormat) -> Table | N
     values = np.column_stack([table.column(name).to_numpy() for name in names])
     if not np.isfinite(values).all():
         return None
+    # A quoted field with line breaks: only the line reader knows on which line each record is.
+    if len(text.splitlines()) != len(values) + 1:
+        return None
     lines = np.arange(2, len(values) + 2, dtype=np.int64)
     return Table(values, lines, (True,) * len(names), CSV)

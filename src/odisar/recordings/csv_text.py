@@ -21,6 +21,9 @@ def read_text(path: Path, notes: Notes) -> str | None:
     if not raw.strip(codecs.BOM_UTF8 + b" \t\r\n"):
         notes.error("the file is empty", "export it again, or remove it")
         return None
+    if raw.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):  # LE starts as UTF-16 does
+        notes.error("the file is in UTF-32", _UTF8, row=1)
+        return raw.decode("utf-32", errors="replace")
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         notes.error("the file is in UTF-16", _UTF8, row=1)
         return raw.decode("utf-16", errors="replace")

@@ -1,5 +1,6 @@
 """Whether a file can be opened at all and is not larger than a recording may be."""
 
+import stat
 from pathlib import Path
 
 from odisar.recordings.quality import Notes
@@ -14,11 +15,32 @@ def check_file(path: Path, notes: Notes) -> bool:
         notes.error("a folder has the name of a recording", "rename or remove the folder")
         return False
     try:
-        size = path.stat().st_size
+        found = path.stat()
     except OSError as fault:
         note_unreadable(fault, notes)
         return False
-    return check_size(size, "file", notes)
+    if not stat.S_ISREG(found.st_mode):
+        note_special(path, notes)
+        return False
+    return check_size(found.st_size, "file", notes)
+
+
+def is_special(path: Path) -> bool:
+    """Return whether a path leads to what is neither a file nor a folder: reading may not end."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return False
+    return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
+
+
+def note_special(path: Path, notes: Notes) -> None:
+    """Note that a pipe, a socket or a device has the name of a file to read."""
+    notes.error(
+        "not a regular file but a pipe, a socket or a device: it is not read",
+        "replace it by a file, or remove it",
+        value=path.name,
+    )
 
 
 def check_size(size: int, what: str, notes: Notes, row: int | None = None) -> bool:

@@ -74,6 +74,10 @@ def _read(file: parquet.ParquetFile, names: Sequence[str], notes: Notes) -> Tabl
     if not check_size(rows * len(names) * 8, "table", notes):
         return None
     columns = file.read(columns=readable, use_threads=False)
+    if columns.num_rows != rows:
+        value = f"{columns.num_rows} rows where its end states {rows}"
+        notes.error("the file is damaged", _EXPORT_AGAIN, value=value)
+        return None
     lines = np.arange(1, rows + 1, dtype=np.int64)
     table = Table(
         np.full((rows, len(names)), np.nan),

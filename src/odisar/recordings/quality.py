@@ -36,8 +36,9 @@ QUALITY_COLUMNS = (
 class Finding:
     """One thing found wrong (``error``) or worth knowing (``warning``).
 
-    ``row`` is the line number in the file, header included, as an editor shows it; ``column``,
-    ``row`` and ``value`` are empty where the finding is about the whole file or folder.
+    ``row`` is the line number in a CSV file (header included, as an editor shows it), the row
+    number in a Parquet file or the message number in a bag; ``column``, ``row`` and ``value``
+    are empty where the finding is about the whole file or folder.
     """
 
     severity: Severity
@@ -149,8 +150,13 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def _printable(text: str) -> str:
+    """Return text without what a file could steer a terminal with."""
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
 def _shorten(text: str) -> str:
-    printable = "".join(character if character.isprintable() else "?" for character in text)
+    printable = _printable(text)
     if len(printable) <= _VALUE_WIDTH:
         return printable
     return printable[: _VALUE_WIDTH - 3] + "..."
@@ -160,12 +166,12 @@ def _aligned(findings: Iterable[Finding]) -> str:
     rows = [("file", "row", "column", "value", "problem", "what to do")]
     rows += [
         (
-            finding.file,
+            _printable(finding.file),
             "" if finding.row is None else str(finding.row),
             _shorten(finding.column),
             _shorten(finding.value),
-            finding.problem,
-            finding.remedy,
+            _printable(finding.problem),
+            _printable(finding.remedy),
         )
         for finding in findings
     ]
@@ -234,9 +240,10 @@ def _quality_row(
 
 def _sentence(finding: Finding) -> str:
     place = [f"row {finding.row}"] if finding.row is not None else []
-    place += [finding.column] if finding.column else []
+    place += [_shorten(finding.column)] if finding.column else []
     place += [_shorten(finding.value)] if finding.value else []
-    return f"{finding.problem} ({', '.join(place)})" if place else finding.problem
+    problem = _printable(finding.problem)
+    return f"{problem} ({', '.join(place)})" if place else problem
 
 
 def write_findings(path: Path, findings: Sequence[Finding]) -> None:

@@ -22,7 +22,7 @@ from odisar.recordings.index import Index, default_info, describe, read_index
 from odisar.recordings.labels import read_labels
 from odisar.recordings.parquet_reader import read_parquet
 from odisar.recordings.quality import Finding, Notes
-from odisar.recordings.resampling import hold_segments
+from odisar.recordings.resampling import resample_segments
 from odisar.recordings.schema import Interval, Recording
 from odisar.recordings.table import Table
 
@@ -96,8 +96,10 @@ def _read_recording(path: Path, case_name: str, case: Case, notes: Notes) -> Rec
         return None
     time_s = np.ascontiguousarray(table.values[:, 0])
     values = np.ascontiguousarray(table.values[:, 1:])
-    if case.source.resample == "hold":
-        time_s, values, segments = hold_segments(time_s, values, segments, case.rate_hz)
+    if case.source.resample != "none":
+        time_s, values, segments = resample_segments(
+            time_s, values, segments, case.rate_hz, case.source.resample
+        )
     info = default_info(case_name, case)
     if table.started_at:
         info = replace(info, extra={STARTED_AT: table.started_at})

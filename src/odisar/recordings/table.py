@@ -1,6 +1,7 @@
 """What every reader makes of a file: the declared columns as numbers, and the row of each."""
 
 import difflib
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from odisar.recordings.quality import ROWS_LISTED, Notes, Severity
 
 _TOPICS_LISTED = 20
+_COLUMNS_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,8 @@ def check_header(
             hint = f"rename {close!r} to {name!r}" if close else f"add {name!r}"
             problem = "the column is missing"
             notes.error(problem, f"{hint}, or change the case", column=name, row=row)
-    for field in sorted(set(header)):
-        times = list(header).count(field)
+    counts = Counter(header)
+    for field, times in sorted(counts.items()):
         if times > 1:
             notes.error(
                 "the column appears more than once",
@@ -84,14 +86,18 @@ def check_header(
                 row=row,
                 value=f"{times} times",
             )
-        if field not in names:
-            notes.warning(
-                "the column is not declared and is not read",
-                "add it to the case's channels to use it",
-                column=field,
-                row=row,
-            )
-    return tuple(name in header for name in names)
+    _note_undeclared(sorted(counts.keys() - set(names)), row, notes)
+    return tuple(name in counts for name in names)
+
+
+def _note_undeclared(fields: Sequence[str], row: int | None, notes: Notes) -> None:
+    problem = "the column is not declared and is not read"
+    remedy = "add it to the case's channels to use it"
+    for field in fields[:_COLUMNS_LISTED]:
+        notes.warning(problem, remedy, column=field, row=row)
+    rest = len(fields) - _COLUMNS_LISTED
+    if rest > 0:
+        notes.warning(problem, remedy, row=row, value=f"and {rest:,} more")
 
 
 def closest(name: str, candidates: Iterable[str]) -> str | None:

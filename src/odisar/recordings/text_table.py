@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +83,7 @@ def _lines(text: str, notes: Notes) -> list[tuple[int, list[str]]]:
 
 def _header_is_sound(header: Sequence[str], required: Sequence[str], notes: Notes) -> bool:
     missing = [name for name in required if name not in header]
-    repeated = sorted({name for name in header if header.count(name) > 1})
+    repeated = sorted(name for name, times in Counter(header).items() if times > 1)
     comma = "" if len(header) > 1 else "; separate the fields with commas"
     for name in missing:
         notes.error("the column is missing", f"add {name!r}{comma}", column=name, row=1)

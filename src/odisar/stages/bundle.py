@@ -57,14 +57,27 @@ def measure_again(
 ) -> DevelopmentScore:
     """Measure an earlier bundle of a set-up on today's development recordings.
 
-    Raises OdisarError where its channels are not those of today's case.
+    Raises OdisarError where its channels, their units, its rate or its pose are not those of
+    today's case.
     """
-    now, then = config.case_of(setup).channel_names, deployed.case.channel_names
-    if now != then:
-        raise OdisarError(f"its channels are {', '.join(then)}, today's {', '.join(now)}")
+    today, its = _measured_in(config.case_of(setup)), _measured_in(deployed.case)
+    for what, then in its.items():
+        if then != today[what]:
+            raise OdisarError(f"its {what} {then}, today's {today[what]}")
     use_one_thread()
     member = setup_members(config, setup)[0]
     return _measure(config, member, load_member(config, workspace, member), deployed.twin)
+
+
+def _measured_in(case: Case) -> dict[str, str]:
+    """Return, by words for each, what two cases must share for one twin to take both's samples."""
+    pose = case.pose
+    return {
+        "channels are": ", ".join(case.channel_names),
+        "units are": ", ".join(channel.unit for channel in case.channels),
+        "rate_hz is": f"{case.rate_hz!r}",
+        "pose is": "none" if pose is None else f"{', '.join(pose.channels)} ({pose.coordinates})",
+    }
 
 
 def _bundle(job: _Job) -> DevelopmentScore:

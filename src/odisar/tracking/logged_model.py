@@ -90,7 +90,10 @@ def download(uri: str, folder: Path) -> None:
             raise OdisarError(f"{uri}: the model's files cannot be fetched: {error}") from error
     # Byte code of an earlier load in the store: not registered, and Python would run it.
     for cache in list(folder.rglob("__pycache__")):
-        shutil.rmtree(cache)
+        if cache.is_dir() and not cache.is_symlink():
+            shutil.rmtree(cache)
+        else:
+            cache.unlink(missing_ok=True)
 
 
 def bundle_folder(folder: Path) -> Path:

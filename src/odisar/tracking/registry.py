@@ -1,10 +1,12 @@
 """The MLflow registry: bundles as models that load without pickle, checked against their tags."""
 
 import atexit
+import fcntl
 import re
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,14 @@ from odisar.errors import OdisarError
 from odisar.tracking.champion import CHAMPION, Decision, Standing, decide
 from odisar.tracking.description import describe_version
 from odisar.tracking.logged_model import bundle_folder, download, log_bundle, model_hash, prove
-from odisar.tracking.runs import TrackedRun, content_key, data_hash, git_revision, tracking_uri
+from odisar.tracking.runs import (
+    TrackedRun,
+    content_key,
+    data_hash,
+    git_revision,
+    tracking_root,
+    tracking_uri,
+)
 
 CONTENT_TAG, MANIFEST_TAG, MODEL_TAG = "odisar.content", "odisar.manifest_sha256", "odisar.sha256"
 DECISION_TAG = "odisar.decision"
@@ -62,9 +71,23 @@ def register(
 
     The model is called ``<experiment>.<set-up>``. A new version is loaded and asked before it is
     registered. ``rescore`` measures an earlier champion on today's development recordings; it is
-    called where the champion was measured on others, and may raise OdisarError.
+    called where the champion was measured on others, and may raise OdisarError. Of several
+    processes that register at once, one waits for the other.
     """
     deployed = read_bundle(bundle)
+    with _one_at_a_time(root):
+        return _register(root, run, bundle, deployed, score, rule, rescore)
+
+
+def _register(
+    root: Path,
+    run: TrackedRun,
+    bundle: Path,
+    deployed: Deployed,
+    score: DevelopmentScore,
+    rule: ChampionRule,
+    rescore: Rescore,
+) -> Registration:
     mlflow.set_tracking_uri(tracking_uri(root))
     client = MlflowClient(tracking_uri(root))
     name = _model_name(client, run, deployed.manifest.origin.setup)
@@ -121,9 +144,8 @@ def _model_name(client: MlflowClient, run: TrackedRun, setup: str) -> str:
 
 
 def _find_version(client: MlflowClient, name: str, content: str) -> ModelVersion | None:
-    query = f"name='{name}' and tags.`{CONTENT_TAG}`='{content}'"
-    found = client.search_model_versions(query, max_results=1)
-    return found[0] if found else None
+    found = client.search_model_versions(f"tags.`{CONTENT_TAG}`='{content}'")
+    return next((version for version in found if version.name == name), None)
 
 
 def _create_version(
@@ -191,6 +213,8 @@ def _standing(version: ModelVersion, score: DevelopmentScore, rescore: Rescore) 
             measured = rescore(read_bundle(bundle_folder(Path(folder))))
     except OdisarError as error:
         return Standing(number, None, str(error))
+    if measured.measured_on != score.measured_on:
+        return Standing(number, None, "it scores other windows (context or horizon differ)")
     return Standing(number, measured.auroc, "it cannot be measured on today's recordings")
 
 
@@ -201,11 +225,22 @@ def _version(client: MlflowClient, name: str, alias_or_version: str) -> ModelVer
         return client.get_model_version_by_alias(name, alias_or_version)
     except MlflowException as error:
         models = ", ".join(m.name for m in client.search_registered_models()) or "none"
-        numbers = ", ".join(str(v.version) for v in client.search_model_versions(f"name='{name}'"))
+        versions = client.search_model_versions()  # a name with a quote in it is no filter
+        numbers = ", ".join(str(v.version) for v in versions if v.name == name)
         raise OdisarError(
             f"there is no version or alias {alias_or_version!r} of model {name!r}; registered "
             f"models: {models}; versions of this one: {numbers or 'none'}"
         ) from error
+
+
+@contextmanager
+def _one_at_a_time(root: Path) -> Iterator[None]:
+    """Hold the lock of the store: finding a version and making it is no single step in MLflow."""
+    store = tracking_root(root) / "mlartifacts"
+    store.mkdir(parents=True, exist_ok=True)
+    with (store / "registering.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # until the file is closed
+        yield
 
 
 def _champion(client: MlflowClient, name: str) -> ModelVersion | None:

@@ -1,16 +1,20 @@
 """What is measured on development recordings is protocol P2, on the judged ones, in intervals."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from odisar.capability.scoring import Scorer
 from odisar.config.judging import EvaluationConfig, Judging
+from odisar.deployment import development
 from odisar.deployment.development import judged_recordings, measure
+from odisar.errors import OdisarError
 from odisar.evaluation.metrics import auroc
 from odisar.evaluation.protocols import take_samples
 from odisar.evaluation.scored import ScoredRecording
+from odisar.stages.bundle import measure_again
 from small_bundle import pushed, small_case, small_settings
 from small_system import make_recording
 
@@ -88,6 +92,19 @@ def test_the_hash_is_that_of_the_recordings_in_any_order(scorer, recordings):
     assert measured(scorer, other).measured_on != score.measured_on
 
 
+@pytest.mark.parametrize("changes", [{"context_steps": 25}, {"horizon_steps": 5}])
+def test_scores_at_other_positions_are_not_compared(scorer, recordings, changes, monkeypatch):
+    before = measured(scorer, recordings).measured_on
+    assert measured(scorer, recordings).measured_on == before
+    monkeypatch.setattr(
+        development, "_score", lambda *_: (np.array([0.1, 0.2]), np.array([0, 1]) > 0)
+    )
+    assert measured(scorer, recordings).measured_on == before
+    spec = replace(scorer.twin.spec, **changes)
+    other = SimpleNamespace(twin=SimpleNamespace(spec=spec))
+    assert measured(other, recordings).measured_on != before
+
+
 @pytest.mark.parametrize("splits", [[], [make_recording("clean")]])
 def test_without_a_disturbed_recording_nothing_is_measured(scorer, splits):
     score = measured(scorer, splits)
@@ -105,3 +122,38 @@ def test_only_recordings_of_the_overall_group_are_judged(recordings):
     groups = {**small_case().groups.model_dump(), "overall": {"disturbance": ["storm"]}}
     assert judged_recordings(recordings, small_case(groups=groups)) == []
     assert len(judged_recordings(recordings, small_case())) == 4
+
+
+def dumped():
+    return [channel.model_dump() for channel in small_case().channels]
+
+
+def in_degrees(channels):
+    channels[2]["unit"] = "deg/s"
+    return {"channels": channels}
+
+
+def with_pose(coordinates, channels):
+    for channel in channels:
+        channel.update(role="state", unit="rad")
+    pose = {"x": "Speed", "y": "Turn Rate", "heading": ["Command"], "coordinates": coordinates}
+    return {"channels": channels, "pose": pose}
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "complaint"),
+    [
+        ({"rate_hz": 2.0}, {}, "its rate_hz is 2.0, today's 1.0"),
+        (in_degrees(dumped()), {}, "its units are m/s, m/s, deg/s, today's m/s, m/s, m/s"),
+        (
+            with_pose("relative", dumped()),
+            with_pose("absolute", dumped()),
+            "its pose is Speed, Turn Rate, Command (relative), today's Speed",
+        ),
+    ],
+)
+def test_a_champion_of_another_rate_unit_or_pose_is_not_measured(then, now, complaint):
+    config = SimpleNamespace(case_of=lambda _: small_case(**now))
+    with pytest.raises(OdisarError) as caught:
+        measure_again(config, None, "small", SimpleNamespace(case=small_case(**then)))
+    assert complaint in str(caught.value)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from odisar.deployment import samples
 from odisar.deployment.samples import recordings_from_table
 from odisar.errors import OdisarError
 from small_bundle import MAX_ROWS, small_case, table_of
@@ -59,6 +60,27 @@ def test_a_repeated_column_is_refused(table):
 
 def test_columns_without_names_are_refused(table):
     assert "unknown column '0'" in refusal(table.set_axis(range(4), axis="columns"))
+
+
+def test_a_table_of_thousands_of_columns_is_refused_without_comparing_them(monkeypatch):
+    monkeypatch.setattr(samples, "closest", lambda *_: pytest.fail("compared"))
+    wide = pd.DataFrame(np.ones((1, 20_000)), columns=[f"c{i}" for i in range(20_000)])
+    assert "20000 columns, far more than the 4 of the case" in refusal(wide)
+
+
+def test_a_column_name_too_long_to_be_a_misspelling_is_not_compared(table, monkeypatch):
+    compared = []
+    monkeypatch.setattr(samples, "closest", lambda _, names: compared.extend(names))
+    said = refusal(table.rename(columns={"Speed": "x" * 1_000_000, "Command": "command"}))
+    assert set(compared) == {"command"}
+    assert len(said) < 1000
+
+
+def test_a_long_name_of_a_recording_is_shortened(table):
+    table.loc[3, "Speed"] = 50.0
+    said = refusal(table.assign(recording="r" * 1_000_000))
+    assert "recording 'rrr" in said
+    assert len(said) < 1000
 
 
 def test_an_empty_table_is_refused(table):

@@ -5,8 +5,10 @@ import shutil
 import sqlite3
 
 import numpy as np
+import pyarrow as pa
 import pytest
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Writer
+from backports import zstd
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Writer, storage_mcap
 
 from odisar.recordings import file_checks
 
@@ -154,3 +156,86 @@ def test_a_folder_of_recordings_that_is_a_bag_itself(bag_boat, ros, messages, tm
     for entry in path.iterdir():
         shutil.move(entry, bag_boat.folder / entry.name)
     assert "a folder that holds it" in bag_boat.one("is itself a ROS 2 bag").remedy
+
+
+@pytest.mark.parametrize("stamp", ["header", "received"])
+@pytest.mark.parametrize(("written", "value"), [("abc", "'abc'"), (9.3e18, "9.3e+18"), (-5, "-5")])
+def test_a_time_of_arrival_that_is_no_whole_number(boat_with, ros, messages, stamp, written, value):
+    boat = boat_with(stamp=stamp)
+    path = ros.write(boat.folder / "a", messages, "sqlite")
+    with contextlib.closing(sqlite3.connect(path / "a.db3")) as database, database:
+        database.execute("DROP INDEX timestamp_idx")
+        database.execute("UPDATE messages SET timestamp = ? WHERE id = 10", [written])
+    finding = boat.one("the time of arrival is no whole number of nanoseconds")
+    assert (finding.severity, finding.value) == ("error", value)
+    assert finding.row == (1 if written == -5 else SAMPLES)
+    assert boat.read().recordings == []
+
+
+def test_a_time_of_arrival_that_is_null(bag_boat, ros, messages):
+    path = ros.write(bag_boat.folder / "a", messages, "sqlite")
+    with contextlib.closing(sqlite3.connect(path / "a.db3")) as database, database:
+        database.execute("CREATE TABLE copied AS SELECT * FROM messages")
+        database.execute("DROP TABLE messages")
+        database.execute("ALTER TABLE copied RENAME TO messages")
+        database.execute("UPDATE messages SET timestamp = NULL WHERE id = 10")
+    assert bag_boat.one("the time of arrival is no whole number").value == "None"
+
+
+@pytest.mark.parametrize("mode", ["FILE", "MESSAGE"])
+def test_a_bag_that_is_larger_than_the_limit_once_it_is_decompressed(
+    bag_boat, ros, messages, mode, monkeypatch
+):
+    monkeypatch.setattr(file_checks, "MAX_FILE_BYTES", 3_000_000)
+    zeros = b"\x00\x01\x00\x00" + bytes(40_000_000)
+    bomb = ("/odom", "nav_msgs/msg/Odometry", ros.ns(31), zeros)
+    writer = Writer(bag_boat.folder / "a", version=9, storage_plugin=ros.storage("mcap"))
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    ros.fill(writer, [*messages, bomb])
+    unpack = zstd.ZstdFile if mode == "FILE" else zstd
+    name = "readinto" if mode == "FILE" else "decompress"
+    monkeypatch.setattr(unpack, name, lambda *_: pytest.fail("decompressed without a limit"))
+    what = "decompressed bag" if mode == "FILE" else "part of the bag that is read"
+    finding = bag_boat.one(f"the {what} is larger than the limit")
+    assert finding.value in ("3 MiB", "4 MiB")
+
+
+def test_a_chunk_that_is_larger_than_it_states_is_not_decompressed(
+    bag_boat, ros, messages, monkeypatch
+):
+    """rosbags would first decompress all of it and then compare."""
+    zeros = b"\x00\x01\x00\x00" + bytes(40_000_000)
+    large = ("/odom", "nav_msgs/msg/Odometry", ros.ns(31), zeros)
+    writer = Writer(bag_boat.folder / "a", version=9, storage_plugin=ros.storage("mcap"))
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    ros.fill(writer, [*messages, large])
+    assert bag_boat.one("the message cannot be decoded").row == SAMPLES + 1
+    monkeypatch.setattr(file_checks, "MAX_FILE_BYTES", 3_000_000)
+    monkeypatch.setattr(zstd, "decompress", lambda *_: pytest.fail("without a limit"))
+    assert "larger than the limit of a file" in bag_boat.one("is cut off or damaged").value
+
+
+@pytest.mark.parametrize("codec", ["lz4", "zstd"])
+def test_a_chunk_is_decompressed_to_one_byte_more_than_it_states_at_most(codec):
+    raw = bytes(range(256)) * 20_000
+    packed = pa.compress(raw, codec=codec, asbytes=True)
+    unpack = storage_mcap.DECOMPRESSORS[codec]
+    assert unpack(packed, len(raw)) == raw
+    assert unpack(packed, 1000) == raw[:1001]
+
+
+@pytest.mark.parametrize("suffix", [".MCAP", ".Db3"])
+def test_a_file_of_messages_whose_name_does_not_end_in_lower_case(bag_boat, suffix):
+    bag_boat.write(f"b{suffix}", b"anything")
+    finding = bag_boat.one("not in lower case")
+    assert finding.remedy == f"rename it to lower case: b{suffix.lower()}"
+
+
+@pytest.mark.parametrize(("old", "new"), [(b"ros2", b"ros1"), (b"ros2msg", b"ros1msg")])
+def test_an_mcap_file_of_another_system(bag_boat, ros, messages, tmp_path, old, new):
+    path = ros.write(tmp_path / "b", messages) / "b.mcap"
+    raw = path.read_bytes()
+    count = 1 if old == b"ros2" else -1
+    bag_boat.write("b.mcap", raw.replace(old, new, count))
+    finding = bag_boat.one("not a ROS 2 bag")
+    assert finding.remedy.startswith("convert it")

@@ -1,8 +1,22 @@
 """Topics, fields and message definitions that a bag has, or has not."""
 
+import shutil
+
 import numpy as np
 import pytest
+from rosbags.interfaces import (
+    Connection,
+    ConnectionExtRosbag2,
+    MessageDefinition,
+    MessageDefinitionFormat,
+    Nodetype,
+)
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import TypesysError
+from rosbags.typesys.store import Typestore
+
+from odisar.recordings import bag_definitions
+from odisar.recordings.bag_definitions import definitions
 
 START_NS = 1_700_000_000_000_000_000
 SAMPLES = 30
@@ -179,3 +193,106 @@ def test_a_topic_with_messages_of_two_types(bag_boat, ros):
             writer.add_connection("/odom", kind, typestore=types)
     finding = bag_boat.one("messages of several types")
     assert finding.value == "nav_msgs/msg/Odometry, std_msgs/msg/Float64"
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_a_topic_with_messages_of_two_definitions(bag_boat, ros, messages, alone):
+    """The second would be read with the first: silently as other numbers."""
+    kind = "boat_msgs/msg/Rudder"
+    texts = {
+        "/rudder": "float64 data\nfloat64 rate\n",
+        "/ruddor": "float64 rate\nfloat64 data\n",
+    }
+    path = bag_boat.folder / "a"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        odom = writer.add_connection("/odom", messages[2][1], typestore=ros.types())
+        for topic, text in texts.items():
+            other = f"boat_msgs/msg/{topic[1:].title()}"
+            rudder = writer.add_connection(topic, other, msgdef=text, rihs01="none")
+            writer.write(rudder, START_NS, b"\x00\x01\x00\x00" + bytes(16))
+        _, odometry, arrival_ns, message = messages[2]
+        writer.write(odom, arrival_ns, ros.types().serialize_cdr(message, odometry))
+    for file in path.iterdir():
+        file.write_bytes(file.read_bytes().replace(b"uddor", b"udder"))
+    if alone:
+        (path / "a.mcap").rename(bag_boat.folder / "b.mcap")
+        shutil.rmtree(path)
+    finding = bag_boat.one("messages of several definitions")
+    assert (finding.column, finding.value) == ("/rudder", f"2 definitions of {kind}")
+
+
+def rudder_of(boat, ros, messages, text):
+    with Writer(boat.folder / "a", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.add_connection("/odom", messages[2][1], typestore=ros.types())
+        rudder = writer.add_connection(
+            "/rudder", "boat_msgs/msg/Rudder", msgdef=text, rihs01="none"
+        )
+        writer.write(rudder, START_NS, b"\x00\x01\x00\x00" + bytes(16))
+    return boat
+
+
+def definition_of(text):
+    fmt = MessageDefinitionFormat.IDL if "IDL: " in text else MessageDefinitionFormat.MSG
+    ext = ConnectionExtRosbag2("cdr", [])
+    definition = MessageDefinition(fmt, text)
+    return Connection(1, "/rudder", "boat_msgs/msg/Rudder", definition, "", 1, ext, None)
+
+
+@pytest.mark.parametrize("place", ["asked for", "inner", "beside"])
+@pytest.mark.parametrize("hostile", ["x: int = __import__('os')", "x\nraise SystemExit", "a b"])
+def test_names_that_are_code_never_get_to_where_code_is_made(monkeypatch, place, hostile):
+    number = (Nodetype.BASE, ("float64", 0))
+    spoiled, sound = ([], [(hostile, number)]), ([], [("data", number)])
+    inner = (Nodetype.NAME, "boat_msgs/msg/Angle")
+    types = {
+        "asked for": {"boat_msgs/msg/Rudder": spoiled},
+        "inner": {
+            "boat_msgs/msg/Rudder": ([], [("angle", inner)]),
+            "boat_msgs/msg/Angle": spoiled,
+        },
+        "beside": {"boat_msgs/msg/Rudder": sound, "boat_msgs/msg/Angle": spoiled},
+    }
+    monkeypatch.setattr(bag_definitions, "_parse", lambda *_: types[place])
+    monkeypatch.setattr(Typestore, "register", lambda *_: pytest.fail("code is made"))
+    with pytest.raises(TypesysError, match="names that ROS does not allow"):
+        definitions(definition_of(""))
+
+
+def test_a_type_whose_name_is_code_is_refused_even_if_no_field_has_it(monkeypatch):
+    sound = ([], [("data", (Nodetype.BASE, ("float64", 0)))])
+    types = {"boat_msgs/msg/Rudder": sound, "x: int = __import__('os')": sound}
+    monkeypatch.setattr(bag_definitions, "_parse", lambda *_: types)
+    with pytest.raises(TypesysError, match="names that ROS does not allow"):
+        definitions(definition_of(""))
+
+
+def idl(body):
+    return (
+        f"{BORDER}IDL: boat_msgs/msg/Rudder\nmodule boat_msgs {{ module msg {{ {body} "
+        "struct Rudder { double data; }; }; };\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("string[1001] names\n", "names of boat_msgs/msg/Rudder has more than 1,000 elements"),
+        ("std_msgs/Empty[2000] data\n", "more than 1,000 elements"),
+        ("float64[1000001] data\n", "more than 1,000,000 elements"),
+        ("float64 data\n#" + "x" * 262_144, "more than 262,144 characters"),
+        ("".join(f"int8 x{i}\n" for i in range(2001)), "more than 2,000 fields"),
+        (idl("const long X = 1 << 99999999999;"), "has to be worked out"),
+        (idl("const long X = " + "(" * 30 + "1" + ")" * 30 + ";"), "has to be worked out"),
+        (idl('@verbatim(language="c", text="(") const long X = (1);'), "has to be worked out"),
+    ],
+)
+def test_a_definition_that_would_take_all_time_or_memory(bag_boat, ros, messages, text, reason):
+    boat = rudder_of(bag_boat, ros, messages, text)
+    finding = boat.one("the definition of boat_msgs/msg/Rudder is too large")
+    assert (finding.severity, finding.column) == ("error", "/rudder")
+    assert reason in finding.problem
+
+
+def test_comments_of_a_definition_may_hold_anything():
+    body = '@verbatim(language="comment", text="a const (see << (x)) 1") // const (("'
+    assert definitions(definition_of(idl(f"{body}\n"))).fielddefs

@@ -133,3 +133,28 @@ def test_a_clock_that_jumps_back_is_named_by_its_message(bag_boat, ros, messages
     finding = bag_boat.one("the time goes back")
     assert (finding.row, finding.value) == (21, "15")
     assert "source.bag.stamp: received" in finding.remedy
+
+
+def test_a_clock_that_jumps_back_in_another_topic_is_named_by_its_message(bag_boat, ros, messages):
+    """Sorted by stamps, what that topic said later would be known to earlier samples."""
+    jumped = [
+        (*ros.joints(i - (5 if i >= 20 else 0) - 0.1, [0.0, i / 100])[:2], ros.ns(i - 0.08),
+         ros.joints(i - (5 if i >= 20 else 0) - 0.1, [0.0, i / 100])[3])
+        for i in range(SAMPLES)
+    ]  # fmt: skip
+    ros.write(bag_boat.folder / "a", without(messages, "/joint_states") + jumped)
+    finding = bag_boat.one("the time goes back")
+    assert (finding.severity, finding.column, finding.row) == ("error", "/joint_states", 21)
+    assert "source.bag.stamp: received" in finding.remedy
+
+
+@pytest.mark.parametrize("blank", [0, 7])
+def test_one_header_that_is_not_filled_in(bag_boat, ros, messages, blank):
+    spoiled = [
+        ros.odometry(i, 5 + i / 10, stamp_ns=0 if i == blank else None) for i in range(SAMPLES)
+    ]
+    ros.write(bag_boat.folder / "a", without(messages, "/odom") + spoiled)
+    finding = bag_boat.one("the stamp of the header is 0")
+    assert (finding.severity, finding.column, finding.row) == ("error", "/odom", blank + 1)
+    assert finding.remedy == "set source.bag.stamp: received, or trim the first messages"
+    assert bag_boat.read().findings == [finding]

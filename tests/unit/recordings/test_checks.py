@@ -96,3 +96,42 @@ def test_a_short_segment_beside_a_long_one_is_a_warning(boat):
 def test_every_segment_too_short_is_an_error(boat):
     boat.spoiled({10: ""}, samples=18)
     assert boat.one("every segment is shorter").severity == "error"
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+def test_seconds_since_1970_do_not_make_steps_too_short_or_too_long(make_boat, rate_hz):
+    """A step of just 0.5 or 1.5 periods is fine, and rounds to a little more or less."""
+    boat = make_boat(rate_hz=rate_hz, max_gap_s=1.0, short_lead_s=1 / rate_hz)
+    places = np.arange(1200.0)
+    places[50::120] += 0.5
+    times = (1.7e9 + places / rate_hz).tolist()
+    lines = (f"{time_s!r},{i % 7},{i % 5},{i % 3}\n" for i, time_s in enumerate(times))
+    boat.write("a.csv", HEADER + "".join(lines))
+    assert boat.read().findings == []
+
+
+def quaternion_boat(make_boat, turned):
+    channels = [
+        {"name": name, "unit": "1", "role": "state", "output": True, "known_ahead": False}
+        | {"min": -30.0, "max": 30.0}
+        for name in ("X", "Y", "Z", "W")
+    ]
+    pose = {"x": "X", "y": "Y", "heading": ["Z", "W"], "coordinates": "absolute"}
+    boat = make_boat(channels=channels, pose=pose)
+    rows = [[i, i % 7, i % 5, np.sin(i / 9), np.cos(i / 9)] for i in range(30)]
+    for place, heading in turned.items():
+        rows[place][3:] = heading
+    lines = [",".join(map(str, map(float, row))) for row in rows]
+    boat.write("a.csv", "\n".join(["time_s,X,Y,Z,W", *lines, ""]))
+    return boat
+
+
+def test_a_heading_that_is_no_unit_quaternion(make_boat):
+    boat = quaternion_boat(make_boat, {4: [0.0, 0.0], 9: [0.0, 1.0]})
+    finding = boat.one("z and w are no unit quaternion")
+    assert (finding.severity, finding.column) == ("error", "Z")
+    assert (finding.row, finding.value) == (6, "0")
+
+
+def test_a_heading_with_rounded_digits_is_a_unit_quaternion(make_boat):
+    assert quaternion_boat(make_boat, {4: [0.70, 0.71]}).read().findings == []

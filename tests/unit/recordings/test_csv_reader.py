@@ -145,3 +145,26 @@ def test_quoted_fields_may_hold_the_separator(separator, plain):
     table = csv_reader.read_columns(text, names, layout, notes)
     assert notes.findings == []
     np.testing.assert_array_equal(table.values, plain[1])
+
+
+def test_of_many_columns_that_are_not_declared_the_first_are_named(boat):
+    header, *lines = boat.good("a.csv").read_text().splitlines()
+    header += "".join(f",c{i:05}" for i in range(20_000))
+    boat.write("a.csv", "\n".join([header, *(line + ",0" * 20_000 for line in lines), ""]))
+    found = boat.found("not declared and is not read")
+    assert [finding.column for finding in found] == [*(f"c{i:05}" for i in range(5)), ""]
+    assert found[-1].value == "and 19,995 more"
+
+
+def test_rows_are_those_of_the_file_where_an_undeclared_field_has_line_breaks(boat):
+    header, *lines = boat.good("a.csv").read_text().splitlines()
+    lines[9] = "9,1,99,0.1"
+    remarks = [line + ',"one\ntwo"' for line in lines]
+    boat.write("a.csv", "\n".join([f"{header},Remark", *remarks, ""]))
+    assert boat.one("outside -15 to 15 m/s").row == 2 + 2 * 9
+
+
+def test_utf_32_is_not_taken_for_utf_16(boat):
+    text = boat.good("a.csv").read_text()
+    boat.write("a.csv", text.encode("utf-32"))
+    assert boat.one("the file is in UTF-").problem == "the file is in UTF-32"

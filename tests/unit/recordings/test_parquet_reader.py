@@ -215,3 +215,13 @@ def test_the_size_limit_is_for_the_file_and_for_what_it_unfolds_to(boat, columns
     monkeypatch.setattr(file_checks, "MAX_FILE_BYTES", 1024**2)
     assert path.stat().st_size < 1024**2
     assert boat.one("the table is larger than the limit of 1 MiB").value == "3 MiB"
+
+
+def test_an_end_that_states_another_number_of_rows(boat, columns, monkeypatch):
+    write(boat, columns)
+    whole = parquet.ParquetFile.read
+    monkeypatch.setattr(
+        parquet.ParquetFile, "read", lambda self, **options: whole(self, **options).slice(1)
+    )
+    finding = boat.one("the file is damaged")
+    assert (finding.severity, finding.value) == ("error", "29 rows where its end states 30")

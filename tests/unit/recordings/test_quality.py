@@ -76,3 +76,15 @@ def test_findings_and_table_are_read_as_they_were_written(tmp_path, make_recordi
     table = quality_table([ERROR], [make_recording("a")])
     write_quality_table(tmp_path / "quality.csv", table)
     pd.testing.assert_frame_equal(read_quality_table(tmp_path / "quality.csv"), table)
+
+
+def test_a_file_cannot_steer_the_terminal_by_its_names():
+    hostile = "\x1b[2Jname"
+    notes = Notes(f"boat/{hostile}.csv")
+    notes.error(f"no field {hostile}", f"rename {hostile}", column=hostile, value=hostile)
+    with pytest.raises(OdisarError) as caught:
+        raise_on_errors(notes.findings)
+    assert "\x1b" not in str(caught.value)
+    assert str(caught.value).count("?[2Jname") == 5
+    table = quality_table(notes.findings, [])
+    assert "\x1b" not in table.findings[0]

@@ -79,7 +79,7 @@ def test_another_rate(write_format, bag_boat, columns, time_s):
     write_format(time_s / 2, columns)
     finding = bag_boat.one("the rate is not rate_hz=1")
     assert finding.value == "2 Hz"
-    assert "source.resample: hold" in finding.remedy
+    assert "source.resample to hold or thin" in finding.remedy
 
 
 def test_a_gap_is_a_warning_and_a_border(write_format, bag_boat, columns, time_s, first_row):

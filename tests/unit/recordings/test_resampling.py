@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
-from odisar.recordings.resampling import hold_on_grid
+from odisar.config.cases import Case
+from odisar.recordings.resampling import hold_on_grid, thin_to_grid
 
 RATE_HZ = 10.0
 HOLD = {"resample": "hold"}
@@ -127,3 +129,48 @@ def test_without_resampling_samples_stay_as_they_are_recorded(make_boat):
     write(boat, time_s)
     (recording,) = boat.read().recordings
     np.testing.assert_array_equal(recording.time_s, time_s)
+
+
+@pytest.mark.parametrize(("recorded_hz", "rate_hz"), [(10, 10), (20, 20), (100, 50)])
+def test_seconds_since_1970_come_back_from_the_grid_they_are_on(recorded_hz, rate_hz):
+    numbers = np.arange(5000)
+    time_s = 1_700_000_000.123 + numbers / recorded_hz
+    grid_s, held = hold_on_grid(time_s, numbers[:, None].astype(float), rate_hz)
+    every = recorded_hz // rate_hz
+    np.testing.assert_array_equal(held[:, 0], numbers[::every])
+    np.testing.assert_allclose(grid_s, time_s[::every], rtol=0, atol=1e-6)
+
+
+def test_a_sample_that_is_held_for_long_is_named(make_boat):
+    boat = make_boat(source=HOLD, max_gap_s=5.0)
+    write(boat, np.delete(np.arange(0, 60, 0.5), range(21, 27)))
+    finding = boat.one("the last sample is held over up to 3.5 s")
+    assert (finding.severity, finding.row, finding.value) == ("warning", 23, "3.5")
+
+
+def test_thinning_keeps_the_held_samples_with_their_own_stamps():
+    time_s = np.array([0.0, 0.03, 0.09, 0.11, 0.21, 0.29, 0.52])
+    values = np.arange(7.0)[:, None]
+    times, kept = thin_to_grid(time_s, values, 10.0)
+    assert times.tolist() == [0.0, 0.09, 0.11, 0.29]
+    assert kept[:, 0].tolist() == [0, 2, 3, 5]
+
+
+def test_thinned_increments_over_their_own_time_give_the_true_speed():
+    random = np.random.default_rng(2)
+    time_s = np.arange(500) * 0.02 + random.uniform(-0.008, 0.008, 500)
+    times, position = thin_to_grid(time_s, 1.5 * time_s[:, None], 10.0)
+    np.testing.assert_allclose(np.diff(position[:, 0]) / np.diff(times), 1.5)
+    held_times, held = hold_on_grid(time_s, 1.5 * time_s[:, None], 10.0)
+    assert np.std(np.diff(held[:, 0]) / np.diff(held_times)) > 0.05
+
+
+def test_a_relative_pose_refuses_held_stamps(boat):
+    raw = boat.case.model_dump()
+    raw["channels"][0]["role"] = "state"
+    raw["pose"] = {"x": "Rudder", "y": "Speed", "heading": ["Heading"], "coordinates": "relative"}
+    raw["source"]["resample"] = "thin"
+    Case.model_validate(raw)
+    raw["source"]["resample"] = "hold"
+    with pytest.raises(ValidationError, match="set it to thin"):
+        Case.model_validate(raw)
