@@ -49,8 +49,10 @@ def _parser() -> argparse.ArgumentParser:
     profile = commands.add_parser("profile", help="run the pipeline with a profile's parameters")
     profile.add_argument("name")
     commands.add_parser("init-store", help="create the MLflow database")
-    commands.add_parser("report", help="put the one-file report together again")
-    commands.add_parser("results", help="print the result table")
+    report = commands.add_parser("report", help="bring the report up to date (make repro first)")
+    results = commands.add_parser("results", help="print the result table")
+    for command in (report, results):
+        command.add_argument("--profile", help="of this profile's workspace")
     promote = commands.add_parser("promote", help="make a registered version the champion")
     promote.add_argument("model")
     promote.add_argument("version")
@@ -103,16 +105,16 @@ def _init_store(root: Path, _options: argparse.Namespace) -> None:
     initialise_store(root)
 
 
-def _report(root: Path, _options: argparse.Namespace) -> None:
+def _report(root: Path, options: argparse.Namespace) -> None:
     from odisar.reproduce import rebuild_report
 
-    rebuild_report(root)
+    rebuild_report(root, options.profile)
 
 
-def _results(root: Path, _options: argparse.Namespace) -> None:
-    from odisar.reproduce import print_results
+def _results(root: Path, options: argparse.Namespace) -> None:
+    from odisar.reproduce import print_results, workspace_of
 
-    print_results(root)
+    print_results(workspace_of(root, options.profile))
 
 
 def _promote(root: Path, options: argparse.Namespace) -> None:

@@ -6,11 +6,13 @@ import sys
 from pathlib import Path
 
 from odisar.artifacts import Workspace, read_table
+from odisar.config.loader import load_config
 from odisar.errors import OdisarError
 from odisar.making import make_recordings, run_dvc, track_recordings
 from odisar.report.headline import headline_text
 from odisar.stages.publish import ensure_published
 from odisar.tracking import ROOT_VARIABLE, initialise_store, tracking_root
+from odisar.tracking.registry import model_name
 
 
 def reproduce(root: Path) -> None:
@@ -19,10 +21,27 @@ def reproduce(root: Path) -> None:
     print_results(root)
 
 
-def rebuild_report(root: Path) -> None:
-    """Bring the report up to date, notebooks included, and print where it is."""
-    run_pipeline(root)
-    print(f"report: {_shown(Workspace(root).report)}")  # noqa: T201
+def workspace_of(root: Path, profile: str | None) -> Path:
+    """Return the folder of a profile's results, or the project's own; it must have some."""
+    folder = root / "workspaces" / profile if profile else root
+    if not Workspace(folder).evaluate.is_dir():
+        command = f"odisar profile {profile}" if profile else "make repro"
+        raise OdisarError(
+            f"{_shown(folder)}: nothing has been evaluated yet; run `{command}` first"
+        )
+    return folder
+
+
+def rebuild_report(root: Path, profile: str | None = None) -> None:
+    """Bring the report up to date, notebooks included, and print where it is.
+
+    Raises OdisarError where nothing was evaluated yet: this is no way to start hours of training.
+    """
+    folder = workspace_of(root, profile)
+    if profile:
+        os.environ[ROOT_VARIABLE] = str(tracking_root(root))
+    run_pipeline(folder)
+    print(f"report: {_shown(Workspace(folder).report)}")  # noqa: T201
 
 
 def run_pipeline(root: Path) -> None:
@@ -64,6 +83,10 @@ def print_results(root: Path) -> None:
             continue
         print(f"{name:>8}: {_shown(path)}")  # noqa: T201
     print(f"{'runs':>8}: make ui    (MLflow, http://127.0.0.1:5000)")  # noqa: T201
+    config = load_config(root)
+    for setup in config.pipeline.setups:
+        name = model_name(config.tracking.experiment, setup)
+        print(f'{"model":>8}: load_model(Path("."), "{name}", "champion")')  # noqa: T201
 
 
 def _shown(path: Path) -> Path:

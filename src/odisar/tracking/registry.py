@@ -90,7 +90,7 @@ def _register(
 ) -> Registration:
     mlflow.set_tracking_uri(tracking_uri(root))
     client = MlflowClient(tracking_uri(root))
-    name = _model_name(client, run, deployed.manifest.origin.setup)
+    name = model_name(_experiment(client, run), deployed.manifest.origin.setup)
     version = _find_version(client, name, content_key(root))
     is_new = version is None
     if version is None:
@@ -116,8 +116,7 @@ def load_model(root: Path, name: str, alias_or_version: str) -> Any:
     assessments. Raises OdisarError where there is no such model or version, where a file of the
     model is not the one that was registered, or where the bundle cannot be read.
     """
-    mlflow.set_tracking_uri(tracking_uri(root))
-    client = MlflowClient(tracking_uri(root))
+    client = _open_store(root)
     version = _version(client, name, alias_or_version)
     folder = Path(tempfile.mkdtemp(prefix="odisar-model-"))
     # The model imports from its folder for as long as the process runs.
@@ -128,7 +127,7 @@ def load_model(root: Path, name: str, alias_or_version: str) -> Any:
 
 def promote(root: Path, name: str, version_number: str) -> str:
     """Move the alias ``champion`` by hand; return what was done in one sentence."""
-    client = MlflowClient(tracking_uri(root))
+    client = _open_store(root)
     version = _version(client, name, version_number)
     before = _champion(client, name)
     was = "there was none" if before is None else f"it was version {before.version}"
@@ -138,9 +137,30 @@ def promote(root: Path, name: str, version_number: str) -> str:
     return f"model {name}: {sentence}"
 
 
-def _model_name(client: MlflowClient, run: TrackedRun, setup: str) -> str:
-    experiment = client.get_experiment(client.get_run(run.run_id).info.experiment_id).name
+def model_name(experiment: str, setup: str) -> str:
+    """Return what the detector of an experiment's set-up is called in the registry."""
     return f"{re.sub(r'[^A-Za-z0-9_-]', '-', experiment)}.{setup}"
+
+
+def _experiment(client: MlflowClient, run: TrackedRun) -> str:
+    name: str = client.get_experiment(client.get_run(run.run_id).info.experiment_id).name
+    return name
+
+
+def _open_store(root: Path) -> MlflowClient:
+    """Return the store at ``root`` or above it; a workspace's models are in the project's.
+
+    Raises OdisarError where there is none: asking for a model must not make an empty one.
+    """
+    start = tracking_root(root)
+    for folder in (start, *start.parents):
+        if (folder / "mlflow.db").is_file():
+            mlflow.set_tracking_uri(tracking_uri(folder))
+            return MlflowClient(tracking_uri(folder))
+    raise OdisarError(
+        f"{start}: no MLflow store (mlflow.db) here or above; run this in the project's root, "
+        "after `make repro` or `odisar profile NAME`"
+    )
 
 
 def _find_version(client: MlflowClient, name: str, content: str) -> ModelVersion | None:
