@@ -60,6 +60,9 @@ def _parser() -> argparse.ArgumentParser:
     new_case.add_argument("folder", type=Path, help="holds a file or a bag for each recording")
     new_case.add_argument("--name", help="of the profile and its case (else that of the folder)")
     new_case.add_argument("--write", action="store_true", help="put it into params.yaml")
+    new_case.add_argument("--rate-hz", type=float, help="work at this rate (else as recorded)")
+    new_case.add_argument("--context-s", type=float, help="seconds that the twin sees")
+    new_case.add_argument("--horizon-s", type=float, help="seconds that it forecasts")
     inspect = commands.add_parser("inspect", help="check recordings, without running anything")
     inspect.add_argument("folder", type=Path)
     declared = inspect.add_mutually_exclusive_group()
@@ -125,10 +128,12 @@ def _promote(root: Path, options: argparse.Namespace) -> None:
 
 def _new_case(root: Path, options: argparse.Namespace) -> None:
     from odisar.proposals.new_case import propose
+    from odisar.proposals.plans import Wishes
     from odisar.proposals.summary import summary
     from odisar.proposals.writing import write_profile
 
-    proposal = propose(root, options.folder, options.name, _say, write=options.write)
+    wishes = Wishes(options.rate_hz, options.context_s, options.horizon_s)
+    proposal = propose(root, options.folder, options.name, _say, write=options.write, wishes=wishes)
     print(f"profiles:\n{proposal.text}", end="", flush=True)
     if options.write:
         write_profile(root, proposal.name, proposal.text)

@@ -148,7 +148,7 @@ def test_one_long_parquet_with_jitter_a_gap_and_a_pose(root, folder, capsys):
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 
 
-def write_bag(path, seed, seconds=60.0):
+def write_bag(path, seed, seconds=60.0, unstamped=0):
     """Write odometry at 50 Hz and an inertial sensor at 100 Hz, as a robot's recorder does."""
     kinds = STORE.types
     vector, point = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Point"]
@@ -174,8 +174,15 @@ def write_bag(path, seed, seconds=60.0):
             facing = kinds["geometry_msgs/msg/Quaternion"](
                 x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2))
             )
+            stamp = 0 if i < unstamped else at
             measured = kinds["sensor_msgs/msg/Imu"](
-                header(at), facing, np.zeros(9), around(turn), np.zeros(9), around(9.8), np.zeros(9)
+                header(stamp),
+                facing,
+                np.zeros(9),
+                around(turn),
+                np.zeros(9),
+                around(9.8),
+                np.zeros(9),
             )
             raw = STORE.serialize_cdr(measured, "sensor_msgs/msg/Imu")
             writer.write(imu, at, raw)
@@ -190,6 +197,17 @@ def write_bag(path, seed, seconds=60.0):
                 kinds["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
             )
             writer.write(odometry, at, STORE.serialize_cdr(moved, "nav_msgs/msg/Odometry"))
+
+
+def test_every_bag_of_a_folder_of_bad_ones_is_told(folder, capsys):
+    for name in "abcd":
+        (folder / f"{name}.mcap").write_text("x" if name != "c" else "")
+    assert run("new-case", folder) == 1
+    error = capsys.readouterr().err
+    assert "none of the 4 recordings can be read" in error
+    for name in "abd":
+        assert re.search(rf"^{name}\.mcap +{name}\.mcap is cut off or damaged", error, re.MULTILINE)
+    assert re.search(r"^c\.mcap +the file is empty +record it again", error, re.MULTILINE)
 
 
 def test_bags_are_read_by_their_odometry(root, folder, capsys):
@@ -208,6 +226,24 @@ def test_bags_are_read_by_their_odometry(root, folder, capsys):
     units = {channel.name: channel.unit for channel in case.channels}
     assert units["angular_velocity_z"] == "rad/s"
     assert units["position_x"] == "m"
+
+
+def test_some_headers_without_a_stamp_make_the_time_of_receipt_the_clock(root, folder, capsys):
+    write_bag(folder / "run_0", 0, unstamped=3)
+    assert run("new-case", folder, "--name", "base", "--write") == 0
+    printed = capsys.readouterr()
+    assert "the header's stamp is 0 in messages of /imu/data" in printed.out
+    assert "1 recording, 1 of them sound" in printed.err
+    assert load_config(lay_out(root, "base")).cases["base"].source.bag.stamp == "received"
+
+
+def test_a_window_chosen_on_the_command_line_is_proposed(folder, capsys):
+    write_rovers(folder)
+    chosen = ("--rate-hz", 2, "--context-s", 10, "--horizon-s", 5)
+    assert run("new-case", folder, "--name", "rover", *chosen) == 0
+    case = YAML(typ="safe").load(capsys.readouterr().out)["profiles"]["rover"]["cases"]["rover"]
+    assert case["rate_hz"] == 2.0
+    assert case["window"] == {"context_steps": 20, "horizon_steps": 10}
 
 
 @pytest.mark.parametrize(
@@ -269,7 +305,7 @@ def test_what_must_be_converted_comes_with_a_program_that_does_it(
             r"no column besides 't' can be a channel \('mode': it never changes",
         ),
         ({"metadata.yaml": "x", "a.db3": "x"}, "is itself a ROS 2 bag"),
-        ({"a.mcap": "x"}, "cannot be read as a ROS 2 bag"),
+        ({"a.mcap": "x"}, r"a\.mcap is cut off or damaged"),
         ({"a.parquet": "x"}, r"a\.parquet: it cannot be read as Parquet"),
     ],
 )

@@ -13,10 +13,11 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 
 from odisar.proposals.bag_fields import Field, make_field, numeric_paths
-from odisar.proposals.samples import Sample, UnusableError
+from odisar.proposals.samples import Sample, UnusableError, none_usable
 from odisar.recordings.bag_fields import definitions, has_header, split_path
+from odisar.recordings.bag_storage import is_complete, note_damage
 from odisar.recordings.bag_topic import Series, TopicReader
-from odisar.recordings.quality import Notes
+from odisar.recordings.quality import Finding, Notes
 
 #: The name of the time column of samples from bags.
 BAG_TIME = "time_s"
@@ -42,7 +43,10 @@ class Topic:
 
 @dataclass(frozen=True)
 class BagLook:
-    """What a proposal takes from bags: ``source.bag``, the samples it makes, and doubts."""
+    """What a proposal takes from bags: ``source.bag``, the samples it makes, and doubts.
+
+    ``undated`` are topics with a header whose stamp is 0, in all or some of the messages.
+    """
 
     stamp: Topic
     topics: tuple[Topic, ...]
@@ -50,6 +54,7 @@ class BagLook:
     fields: tuple[Field, ...]
     samples: tuple[Sample, ...]
     unusable: Mapping[str, str]
+    undated: tuple[str, ...]
 
     @property
     def clock(self) -> str:
@@ -57,32 +62,57 @@ class BagLook:
         return "header" if self.stamp.has_header else "received"
 
 
-def sniff_bags(paths: Sequence[Path]) -> BagLook:
-    """Return a look at bags; raise UnusableError where none holds a topic with numbers."""
+def sniff_bags(paths: Sequence[Path], others: Sequence[Path] = ()) -> BagLook:
+    """Return a look at bags, at one of the ``others`` where none of these can be read.
+
+    Raises
+    ------
+    UnusableError
+        If none can be read, with what is wrong with each, or if none has a topic with numbers.
+    """
     found: dict[Path, dict[str, Topic]] = {}
-    unusable: dict[str, str] = {}
-    for path in paths:
-        try:
-            found[path] = _topics(path)
-        except Exception as fault:  # noqa: BLE001 - a damaged bag makes rosbags raise anything
-            reason = " ".join(str(fault).split()) or type(fault).__name__
-            unusable[path.name] = f"it cannot be read as a ROS 2 bag ({reason})"
+    findings: list[Finding] = []
+    for path in (*paths, *others):
+        if found and path in others:
+            break
+        notes = Notes(path.name)
+        held = _readable_topics(path, notes)
+        if held is not None:
+            found[path] = held
+        findings += [item for item in notes.findings if item.severity == "error"]
+    if not found:
+        raise UnusableError(none_usable([(f.file, _told(f), f.remedy) for f in findings]))
     shared = _shared(list(found.values()))
     if not shared:
-        example = next(iter(unusable.items()), ("", ""))
-        reason = f"{example[0]}: {example[1]}" if example[0] else "no topic has numbers"
-        raise UnusableError(f"no topic that the bags share can make samples ({reason})")
+        raise UnusableError("no topic that the bags share can make samples: none has numbers")
     stamp = max(shared.values(), key=lambda topic: _rank(topic)[:3])
     order = [stamp, *sorted(shared.values(), key=_rank, reverse=True)]
     topics = tuple(dict.fromkeys(order))
     candidates = _named(topics)
     looks = {path: _series(path, stamp, candidates) for path in found}
-    if not all(look.header_filled for look in looks.values()):
+    undated = tuple(sorted({topic for look in looks.values() for topic in look.undated}))
+    if undated:
         stamp = replace(stamp, has_header=False)
         looks = {path: _series(path, stamp, candidates) for path in found}
     samples = [Sample(path, look.table, remarks=look.remarks) for path, look in looks.items()]
     age_s = max(look.longest_age_s for look in looks.values())
-    return BagLook(stamp, topics, age_s, tuple(candidates), tuple(samples), unusable)
+    unusable = {item.file: f"{_told(item)}; {item.remedy}" for item in findings}
+    return BagLook(stamp, topics, age_s, tuple(candidates), tuple(samples), unusable, undated)
+
+
+def _told(finding: Finding) -> str:
+    return f"{finding.problem} ({finding.value})" if finding.value else finding.problem
+
+
+def _readable_topics(path: Path, notes: Notes) -> dict[str, Topic] | None:
+    """Return the topics of a bag with numbers; None where it can't be read, which is noted."""
+    if not is_complete(path, notes):
+        return None
+    try:
+        return _topics(path)
+    except Exception as fault:  # noqa: BLE001 - a damaged bag makes rosbags raise anything
+        note_damage(path, fault, None, notes)
+        return None
 
 
 def _topics(path: Path) -> dict[str, Topic]:
@@ -154,7 +184,7 @@ def _named(topics: Sequence[Topic]) -> list[Field]:
 @dataclass(frozen=True)
 class _Look:
     table: pd.DataFrame
-    header_filled: bool
+    undated: tuple[str, ...]
     longest_age_s: float
     remarks: tuple[str, ...]
 
@@ -183,10 +213,10 @@ def _series(path: Path, stamp: Topic, fields: Sequence[Field]) -> _Look:
                 break
             readers[connection.topic].add(received_ns, raw)
     series = {name: topic.series() for name, topic in readers.items() if len(topic)}
-    filled = not any("every header" in finding.problem for finding in notes.findings)
+    undated = tuple(name for name, one in series.items() if not one.dated)
     table = _join(series, readers, stamp.name)
     remarks = (f"only its first {_MESSAGES} messages were looked at",) if rest else ()
-    return _Look(table, filled, _longest_age_s(series), remarks)
+    return _Look(table, undated, _longest_age_s(series), remarks)
 
 
 def _join(

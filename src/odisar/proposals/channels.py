@@ -3,10 +3,11 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from odisar.proposals.bag_fields import Field
 from odisar.proposals.columns import Column
+from odisar.proposals.guesses import Guess, align_siblings, stem_of
 from odisar.proposals.units import unit_of, words
 
 MAX_CHANNELS = 16
@@ -18,15 +19,32 @@ _COMMAND_WORDS = frozenset({
     "desired", "target", "demand", "demanded", "order", "ordered", "rudder", "throttle", "azimuth",
     "steer", "steering", "thrust", "pwm", "duty", "ctrl", "control", "joy", "joystick", "brake",
     "pedal", "aileron", "elevator", "flap", "valve", "rpm", "propeller", "thruster", "voltage",
-    "helm", "sollwert", "soll",
+    "helm", "sollwert", "soll", "motor", "servo", "esc", "ventil",
 })  # fmt: skip
-_SURE_COMMANDS = frozenset({"cmd", "command", "commanded", "setpoint", "desired", "ordered"})
-_MEASURED = frozenset({"measured", "meas", "actual", "feedback", "fb", "ist", "battery", "state",
-                       "temperature", "temp", "soc", "fuel", "pressure", "status"})  # fmt: skip
+_SURE_COMMANDS = frozenset({"cmd", "command", "commanded", "setpoint", "desired", "ordered",
+                            "soll", "sollwert"})  # fmt: skip
+_COMPOUND = re.compile(r"^(soll|setpoint|ventil)|(soll|setpoint|ventil)$")
+_SEEN = frozenset({"measured", "meas", "actual", "feedback", "fb", "ist", "istwert"})
+_MEASURED = _SEEN | {"battery", "state", "temperature", "temp", "soc", "fuel", "pressure",
+                     "status"}  # fmt: skip
+# A motor's own name is its command; a quantity of it is measured.
+_OF_A_MOTOR = frozenset({"current", "speed", "velocity", "torque", "power", "vibration", "load",
+                         "position", "angle", "strom", "drehzahl", "drehmoment"})  # fmt: skip
 _ONE_SIDED = frozenset({
     "rpm", "pressure", "depth", "range", "distance", "soc", "battery", "fuel", "level", "current",
     "voltage", "power", "flow", "humidity", "throttle", "temperature", "altitude", "count",
+    "percent", "pct", "pwm", "duty", "druck", "durchfluss", "spannung", "drehzahl",
 })  # fmt: skip
+_ONE_SIDED_UNITS = frozenset({"%", "RPM", "bar", "mbar", "Pa", "kPa", "hPa", "l/min", "V", "mV",
+                              "K", "Hz", "kg"})  # fmt: skip
+_HEADINGS = frozenset({"yaw", "heading", "hdg", "course", "cog", "psi", "theta"})
+_CHANGES = frozenset({"rate", "speed", "velocity", "vel", "acc", "acceleration", "error", "err"})
+
+# Directions that reach the border where an angle starts anew: from, to, within, unit.
+_TURNS = (
+    (-160.0, 160.0, 180.5, "deg"), (0.0, 330.0, 360.5, "deg"),
+    (-2.8, 2.8, 3.16, "rad"), (0.0, 5.8, 6.3, "rad"),
+)  # fmt: skip
 _QUATERNION = re.compile(
     r"(^|[_\s.])(q[xyzw]|(orientation|quat(ernion)?|rotation)[_\s.]*[xyzw])\W*$", re.IGNORECASE
 )
@@ -43,19 +61,6 @@ _ANGLES: tuple[tuple[frozenset[str], Mapping[str, float]], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Guess:
-    """A channel as it is proposed, and what its user must check."""
-
-    name: str
-    unit: str
-    role: str
-    output: bool
-    low: float
-    high: float
-    doubts: tuple[str, ...]
-
-
 def guess_channels(
     columns: Sequence[Column], units: Mapping[str, str], fields: Sequence[Field] = ()
 ) -> list[Guess]:
@@ -67,6 +72,7 @@ def guess_channels(
     guesses = [
         _guess(item, units.get(item.name, ""), by_channel.get(item.name)) for item in columns
     ]
+    guesses = align_siblings(guesses)
     if not any(guess.output for guess in guesses):  # better a doubtful forecast than none
         guesses = [replace(guess, output=guess.role == "state") for guess in guesses]
     if guesses and not any(guess.output for guess in guesses):
@@ -96,7 +102,11 @@ def _guess(column: Column, below: str, field: Field | None) -> Guess:
     unit, sure = (field.unit, True) if field and field.unit else unit_of(column.name, below)
     if unit == "1" and not sure and _QUATERNION.search(column.name):
         sure = True
-    if not sure:
+    turn = "" if sure else _turn_unit(column)
+    if turn:
+        unit = turn
+        doubts.append("unit guessed from the range")
+    elif not sure:
         doubts.append("unit unknown" if unit == "1" else "unit guessed")
     role, why = _role(column, field)
     if why:
@@ -119,12 +129,39 @@ def _role(column: Column, field: Field | None) -> tuple[str, str]:
     """Return state or command, and why that is no more than a guess; empty if it is sure."""
     if field is not None:
         return ("command", "its topic's name") if field.is_command else ("state", "")
-    parts = set(words(column.name))
-    if parts & _COMMAND_WORDS and not parts & _MEASURED:
-        return "command", "" if parts & _SURE_COMMANDS else "its name"
+    parts = _parts(column.name)
+    if parts & _SURE_COMMANDS and not parts & _SEEN:
+        return "command", ""
+    if _is_command_word(parts) and not parts & _MEASURED:
+        return "command", "its name"
     if column.held > _HELD and not parts & _MEASURED:
         return "command", f"held still in {100 * column.held:.0f} % of the steps"
     return "state", ""
+
+
+def _parts(name: str) -> set[str]:
+    """Return the words of a name, also without numbers at their ends: "motor1" has motor."""
+    parts = words(name)
+    return {*parts, *(part.rstrip("0123456789") for part in parts)} - {""}
+
+
+def _is_command_word(parts: set[str]) -> bool:
+    if any(_COMPOUND.search(part) for part in parts):
+        return True
+    found = parts & _COMMAND_WORDS
+    return bool(found - {"motor"}) or ("motor" in found and not parts & _OF_A_MOTOR)
+
+
+def _turn_unit(column: Column) -> str:
+    """Return the unit of a direction that is seen to go all around; empty where it isn't."""
+    parts = _parts(column.name)
+    if not parts & _HEADINGS or parts & _CHANGES:
+        return ""
+    for low, high, most, unit in _TURNS:
+        least = low <= column.low if low == 0 else -most <= column.low <= low
+        if least and high <= column.high <= most:
+            return unit
+    return ""
 
 
 def _no_forecast(column: Column, unit: str) -> str:
@@ -145,8 +182,13 @@ def _no_forecast(column: Column, unit: str) -> str:
 def _cap_outputs(guesses: list[Guess]) -> list[Guess]:
     """Return the guesses with no more than so many forecasts, the first ones."""
     forecast = [guess.name for guess in guesses if guess.output]
-    surplus = set(forecast[_MAX_OUTPUTS:])
-    doubt = f"not forecast: {_MAX_OUTPUTS} others are"
+    kept: list[str] = []
+    for stem in dict.fromkeys(map(stem_of, forecast)):  # siblings stay together
+        group = [name for name in forecast if stem_of(name) == stem]
+        if not kept or len(kept) + len(group) <= _MAX_OUTPUTS:
+            kept += group[:_MAX_OUTPUTS]
+    surplus = set(forecast) - set(kept)
+    doubt = f"not forecast: {len(kept)} others are"
     return [
         replace(guess, output=False, doubts=(doubt, *guess.doubts))
         if guess.name in surplus
@@ -161,8 +203,8 @@ def _limits(column: Column, unit: str) -> tuple[float, float, bool]:
     if usual and usual[0] <= column.low and column.high <= usual[1]:
         return *usual, True
     most = _outward(2 * max(abs(column.low), abs(column.high), 1e-9))
-    one_sided = column.low >= 0 and bool(set(words(column.name)) & _ONE_SIDED)
-    return (0.0 if one_sided else -most), most, False
+    is_amount = unit in _ONE_SIDED_UNITS or bool(_parts(column.name) & _ONE_SIDED)
+    return (0.0 if is_amount and column.low >= 0 else -most), most, False
 
 
 def _usual_limits(column: Column, unit: str) -> tuple[float, float] | None:

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from odisar.proposals.samples import Sample
 from odisar.proposals.times import counts_up
 
+#: Why a column of text is left out.
+TEXT = "text: cannot be a channel"
+
 _MISSING_SHARE = 0.05
 _CLOCK_NAME = re.compile(r"(^|[_\s./-])(time|timestamp|stamp|epoch|unix|utc|clock)", re.IGNORECASE)
 _INDEX_NAME = re.compile(
@@ -74,7 +77,7 @@ def _unfit(name: str, parts: Sequence["pd.Series[float]"]) -> str:
     if not all(pd.api.types.is_numeric_dtype(part) for part in parts):
         seen = {str(cell).strip().casefold() for part in parts for cell in part.iloc[:50]}
         is_bool = seen <= {"true", "false", "yes", "no", "on", "off", ""}
-        return "true or false in words: write 1 and 0 to use it" if is_bool else "text"
+        return "true or false in words: write 1 and 0 to use it" if is_bool else TEXT
     values = [np.asarray(part, dtype=np.float64) for part in parts]
     missing = float(np.mean(np.concatenate([np.isnan(part) for part in values])))
     if missing > _MISSING_SHARE:

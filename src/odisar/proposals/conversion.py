@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from odisar.errors import OdisarError
+from odisar.proposals.dates import WHOLE_SECOND, DateFormat
 from odisar.proposals.samples import Sample
 from odisar.proposals.times import TimeColumn
 
@@ -17,12 +18,13 @@ def require_readable(samples: Sequence[Sample], time: TimeColumn, folder: Path) 
     """
     sample = samples[0]
     reasons = [f"{sample.path.name}: {obstacle}" for obstacle in sample.obstacles.values()]
-    if time.is_text:
-        first = str(sample.table[time.name].iloc[0])
+    question = ""
+    if time.dates is not None:
         reasons.append(
-            f"{sample.path.name}: column '{time.name}' holds dates as text ({first}); time must be "
-            "a number of seconds"
+            f"{sample.path.name}: column '{time.name}' holds dates as text "
+            f"({time.dates.example}), {_reading(time.dates)}; time must be a number of seconds"
         )
+        question = _question(time.dates)
     elif not time.is_readable:
         reasons.append(
             f"{sample.path.name}: column '{time.name}' counts {time.unit_name}; time must be in "
@@ -34,10 +36,60 @@ def require_readable(samples: Sequence[Sample], time: TimeColumn, folder: Path) 
     raise OdisarError(
         "the recordings can be understood, but not read as they are:\n  "
         + "\n  ".join(reasons)
+        + question
         + f"\n\nThis writes copies that can be read into {target}:\n\n"
         + program(sample, time, folder, target)
         + f"\nThen: odisar new-case {quoted(target)}"
     )
+
+
+def _reading(dates: DateFormat) -> str:
+    """Say how dates are read."""
+    form = dates.formats[0]
+    if dates.is_ambiguous:
+        return f"which is ambiguous: {' or '.join(map(dates.meaning, dates.formats))}"
+    if "%d" not in form:
+        return f"read as {form}"
+    order = "day" if form.index("%d") < form.index("%m") else "month"
+    order = "year" if form.startswith("%Y") else order
+    return f"read as {form}, the {order} first: {dates.meaning(form)}"
+
+
+def _question(dates: DateFormat) -> str:
+    if not dates.is_ambiguous:
+        return ""
+    return (
+        "\n\nDoes the day or the month stand first? No day in the files is above 12, so nothing "
+        "tells. Take the # away\nbefore one of the two lines `date_format` in the program below; "
+        "as it stands it writes nothing."
+    )
+
+
+def _date_lines(dates: DateFormat, name: str) -> list[str]:
+    """Return the lines that read a column of dates as ``clock``."""
+    text = f'table.pop({name}).astype("string").str.strip()'
+    if dates.fraction:
+        text += f'.str.replace(r"{WHOLE_SECOND}", r"\1{dates.fraction}0", regex=True)'
+    lines = [
+        f"    text = {text}",
+        "    clock = pd.to_datetime(text, format=date_format, utc=True)",
+    ]
+    if dates.is_time_of_day:
+        lines += [
+            '    midnights = (clock.diff() < pd.Timedelta("-12h")).cumsum()',
+            '    clock = clock + pd.to_timedelta(midnights, unit="D")',
+        ]
+    return [*lines, '    table.insert(0, "time_s", (clock - clock.iloc[0]).dt.total_seconds())']
+
+
+def _format_lines(dates: DateFormat) -> list[str]:
+    """Return the line that says how dates are written; where that is open, one for each way."""
+    if not dates.is_ambiguous:
+        return [f"date_format = {json.dumps(dates.formats[0])}"]
+    return [
+        f"# date_format = {json.dumps(form)}  # {dates.example} is {dates.meaning(form)}"
+        for form in dates.formats
+    ]
 
 
 def quoted(path: Path) -> str:
@@ -55,17 +107,15 @@ def program(sample: Sample, time: TimeColumn, folder: Path, target: Path) -> str
     lines = [
         f"{quoted(Path(sys.executable))} - <<'END'",
         "import pathlib, pandas as pd",
+        *(_format_lines(time.dates) if time.dates else ()),
         f"target = pathlib.Path({json.dumps(str(target), ensure_ascii=False)})",
         "target.mkdir(exist_ok=True)",
         f"folder = pathlib.Path({json.dumps(str(folder), ensure_ascii=False)})",
         f'for path in sorted(folder.glob("*.{suffix}")):',
         f"    table = {read}",
     ]
-    if time.is_text:
-        lines += [
-            f'    clock = pd.to_datetime(table.pop({name}), format="mixed", utc=True)',
-            '    table.insert(0, "time_s", (clock - clock.iloc[0]).dt.total_seconds())',
-        ]
+    if time.dates is not None:
+        lines += _date_lines(time.dates, name)
     elif not time.is_readable:
         lines += [
             f"    clock = table.pop({name})",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from odisar.config.formats import CsvFormat
 from odisar.proposals.bag_sniffing import BagLook
-from odisar.proposals.channels import Guess
+from odisar.proposals.guesses import Guess
 from odisar.proposals.plans import Extent, Plan, fault_sizes, plan_training, seconds
 from odisar.proposals.poses import PoseGuess
 from odisar.proposals.times import Pace
@@ -144,14 +144,19 @@ def _bag(draft: Draft, bag: BagLook) -> Iterator[str]:
     age_s = max(2 * bag.max_age_s, 2.0 / bag.stamp.rate_hz)
     yield line(_COLUMN, "bag:")
     yield line(at, f"stamp_topic: {bag.stamp.name}", doubt)
-    yield line(
-        at, f"stamp: {bag.clock}", "" if bag.stamp.has_header else "no header that is filled"
-    )
+    yield line(at, f"stamp: {bag.clock}", _no_header(bag))
     yield line(at, f"max_age_s: {scalar(_short(age_s))}", note="twice the longest pause of a topic")
     yield line(at, "fields:")
     paths = {field.channel: field.path for field in bag.fields}
     for guess in draft.guesses:
         yield line(at + 2, f"{scalar(guess.name)}: {paths[guess.name]}")
+
+
+def _no_header(bag: BagLook) -> str:
+    """Say why the stamps of the headers aren't taken; empty where they are."""
+    if bag.undated:
+        return f"the header's stamp is 0 in messages of {', '.join(bag.undated[:4])}"
+    return "" if bag.stamp.has_header else "no header that is filled"
 
 
 def _channel(guess: Guess) -> str:

@@ -11,7 +11,7 @@ from odisar.errors import OdisarError
 from odisar.proposals.bag_sniffing import BagLook, sniff_bags
 from odisar.proposals.csv_sniffing import sniff_csv
 from odisar.proposals.parquet_sniffing import sniff_parquet
-from odisar.proposals.samples import Sample, UnusableError, names
+from odisar.proposals.samples import Sample, UnusableError, names, none_usable
 from odisar.recordings.folder import BAG_METADATA, INDEX_FILE, LABELS_FILE, Format, format_of
 
 _FILES_LOOKED_AT = 8
@@ -55,9 +55,9 @@ def look_into(folder: Path) -> Look:
     picked = _spread(chosen, _BAGS_LOOKED_AT if kind == "bag" else _FILES_LOOKED_AT)
     if len(picked) < len(chosen):
         remarks.append(f"{len(picked)} of {len(chosen)} recordings were looked at for the proposal")
-    bag = _look_at_bags(picked, folder) if kind == "bag" else None
+    bag = _look_at_bags(picked, chosen, folder) if kind == "bag" else None
     samples, seen = (
-        (bag.samples, _unusable_remarks(bag.unusable)) if bag else _look_at_tables(picked)
+        (bag.samples, _unusable_remarks(bag.unusable)) if bag else _look_at_tables(picked, chosen)
     )
     samples, columns, odd = _common(samples)
     remarks += [*seen, *odd]
@@ -130,26 +130,29 @@ def _spread(paths: Sequence[Path], wanted: int) -> list[Path]:
     return [paths[round(i * (len(paths) - 1) / (wanted - 1))] for i in range(wanted)]
 
 
-def _look_at_bags(paths: Sequence[Path], folder: Path) -> BagLook:
+def _look_at_bags(paths: Sequence[Path], every: Sequence[Path], folder: Path) -> BagLook:
     try:
-        return sniff_bags(paths)
+        return sniff_bags(paths, [path for path in every if path not in paths])
     except UnusableError as fault:
         raise OdisarError(f"{folder}: {fault}") from fault
 
 
-def _look_at_tables(paths: Sequence[Path]) -> tuple[tuple[Sample, ...], list[str]]:
+def _look_at_tables(
+    paths: Sequence[Path], every: Sequence[Path]
+) -> tuple[tuple[Sample, ...], list[str]]:
     samples: list[Sample] = []
     unusable: dict[str, str] = {}
-    for path in paths:
+    others = [path for path in every if path not in paths]
+    for path in (*paths, *others):
+        if samples and path in others:  # these are only looked at where all before are unusable
+            break
         try:
             sniff = sniff_parquet if format_of(path) == "parquet" else sniff_csv
             samples.append(sniff(path))
         except UnusableError as fault:
             unusable[path.name] = str(fault)
     if not samples:
-        name, reason = next(iter(unusable.items()))
-        more = f" (and {len(unusable) - 1} more files)" if len(unusable) > 1 else ""
-        raise OdisarError(f"{name}{more}: {reason}")
+        raise OdisarError(none_usable([(*item, "") for item in unusable.items()]))
     kinds = Counter(sample.signature for sample in samples)
     usual = max(kinds, key=lambda kind: kinds[kind])
     odd = [sample for sample in samples if sample.signature != usual and sample.layout is not None]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from odisar.config.cases import Case, Channel
-from odisar.proposals.tables import shortened, table
+from odisar.proposals.tables import printable, shortened, table
 from odisar.recordings.quality import Finding, quality_table
 from odisar.recordings.reader import ReadResult
 from odisar.recordings.schema import Recording
@@ -21,41 +21,40 @@ _FILES = 200
 
 @dataclass(frozen=True)
 class Inspection:
-    """A quality report as text, and how many errors and warnings it tells of."""
+    """A quality report as text, how many kinds of error it tells of, and all counts in words."""
 
     text: str
     errors: int
-    warnings: int
-
-    @property
-    def counts(self) -> str:
-        """Errors and warnings in words."""
-        return in_words(self.errors, self.warnings)
+    counts: str
 
 
 def inspect_case(case: Case, result: ReadResult, origin: str) -> Inspection:
     """Return the report on recordings that were read as a case declares; ``origin`` names it."""
-    errors, warnings = count(result.findings)
     parts = [
-        f"{case.source.folder}, read as {origin}",
+        printable(f"{case.source.folder}, read as {origin}"),
         _summary(case, result),
         _files(result),
         _findings(result.findings),
         _channels(case, result.recordings),
     ]
     text = "\n\n".join(part for part in parts if part)
-    return Inspection(text, errors, warnings)
+    errors = sum(finding.severity == "error" for finding in result.findings)
+    return Inspection(text, errors, counts_of(result.findings))
 
 
-def count(findings: Sequence[Finding]) -> tuple[int, int]:
-    """Return how many errors and how many warnings there are."""
-    errors = sum(finding.severity == "error" for finding in findings)
-    return errors, len(findings) - errors
+def counts_of(findings: Sequence[Finding]) -> str:
+    """Return "3 errors (2 kinds), 1 warning": every place counts, also those not listed."""
+    told = []
+    for severity in ("error", "warning"):
+        found = [finding for finding in findings if finding.severity == severity]
+        places, kinds = sum(map(_rows, found)), len({_sort(finding) for finding in found})
+        apart = f" of {plural(kinds, 'kind')}" if places > 1 else ""
+        told.append(f"{plural(places, severity)}{apart}")
+    return ", ".join(told)
 
 
-def in_words(errors: int, warnings: int) -> str:
-    """Return "1 error, 2 warnings"."""
-    return f"{plural(errors, 'error')}, {plural(warnings, 'warning')}"
+def _sort(finding: Finding) -> tuple[str, str, str, str]:
+    return finding.severity, finding.column, finding.problem, finding.remedy
 
 
 def plural(number: int, noun: str) -> str:
@@ -110,8 +109,7 @@ def _findings(findings: Sequence[Finding]) -> str:
         return "No findings."
     kinds: dict[tuple[str, str, str, str], list[Finding]] = {}
     for finding in sorted(findings, key=lambda item: item.severity):
-        key = (finding.severity, finding.column, finding.problem, finding.remedy)
-        kinds.setdefault(key, []).append(finding)
+        kinds.setdefault(_sort(finding), []).append(finding)
     rows = [row for kind in kinds.values() for row in _kind_rows(kind)]
     header = ("", "file", "row", "column", "value", "problem", "what to do")
     text = table(header, rows[:_FINDINGS], wrapped=(5, 6))

@@ -11,14 +11,16 @@ from odisar.config.cases import Case
 from odisar.config.loader import load_config
 from odisar.errors import OdisarError
 from odisar.proposals.bag_sniffing import BAG_TIME
-from odisar.proposals.channels import Guess, guess_channels, heading_limit, pick_columns
-from odisar.proposals.columns import Column, read_columns, widened
+from odisar.proposals.channels import guess_channels, heading_limit, pick_columns
+from odisar.proposals.columns import TEXT, Column, read_columns, widened
 from odisar.proposals.conversion import require_readable
 from odisar.proposals.draft import Draft
 from odisar.proposals.gathering import Look, look_into
-from odisar.proposals.plans import Extent, make_plan, shortest_plan
+from odisar.proposals.guesses import Guess
+from odisar.proposals.plans import Extent, Wishes, make_plan, shortest_plan
 from odisar.proposals.poses import PoseGuess, guess_pose
 from odisar.proposals.samples import names
+from odisar.proposals.text_columns import columns_of_text, without_advice
 from odisar.proposals.times import (
     SECONDS_DOUBT,
     Pace,
@@ -37,6 +39,7 @@ _FAST_HZ = 25.0
 _SLOWED_TO_HZ = 10.0
 _NO_LIMIT = 1e12
 _SLOW_HZ = 0.2
+_NO_WISHES = Wishes()
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,15 @@ class Proposal:
 
 
 def propose(
-    root: Path, folder: Path, name: str | None, say: Callable[[str], None], *, write: bool
+    root: Path,
+    folder: Path,
+    name: str | None,
+    say: Callable[[str], None],
+    *,
+    write: bool,
+    wishes: Wishes = _NO_WISHES,
 ) -> Proposal:
-    """Return a proposal for the recordings in a folder.
+    """Return a proposal for the recordings in a folder; ``wishes`` are kept where they can be.
 
     ``say`` is told what takes long. Raises OdisarError where nothing sensible can be proposed,
     with what to do.
@@ -64,21 +73,25 @@ def propose(
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
         raise OdisarError(f"--name {name!r}: use letters, digits, - and _, a letter or digit first")
     check_name(root, name, write=write)
+    wishes.check()
     look = look_into(folder)
     say(f"reading {len(look.files)} recording(s) in {folder} ...")
     time = TimeColumn(BAG_TIME, 1.0, False, False, "") if look.bag else None  # noqa: FBT003
     time = time or find_time(look.samples, look.columns)
     require_readable(look.samples, time, folder)
     pace = measure_pace([time.seconds(sample) for sample in look.samples])
-    first, columns = _first_draft(root, look, time, pace, name)
+    first, columns = _first_draft(root, look, time, pace, name, wishes)
     case = checked_config(root, name, first.text()).cases[name]
-    recordings = read_case(name, case, root).recordings
-    draft = _second_draft(root, first, look, columns, recordings)
+    tried = read_case(name, case, root)
+    text_columns = columns_of_text(look, tried.findings)
+    told = [f"{column} ({TEXT})" for column in text_columns if column not in look.columns]
+    first = replace(first, left_out=[*first.left_out, *told])
+    draft = _second_draft(root, first, look, columns, tried.recordings, wishes)
     text = draft.text()
     case = checked_config(root, name, text).cases[name]
-    result = read_case(name, case, root)
+    result = without_advice(read_case(name, case, root), text_columns)
     remarks = (*_time_remarks(time), *look.remarks)
-    left_out = tuple(set(look.columns) - {time.name, *case.channel_names})
+    left_out = tuple({*look.columns, *text_columns} - {time.name, *case.channel_names})
     return Proposal(name, text, case, result, remarks, left_out, len(look.files))
 
 
@@ -89,7 +102,7 @@ def _name_of(folder: Path) -> str:
 
 
 def _first_draft(
-    root: Path, look: Look, time: TimeColumn, pace: Pace, name: str
+    root: Path, look: Look, time: TimeColumn, pace: Pace, name: str, wishes: Wishes
 ) -> tuple[Draft, list[Column]]:
     """Return a draft without limits, to read every recording with, and its channels' columns."""
     candidates = [column for column in look.columns if column != time.name]
@@ -106,7 +119,7 @@ def _first_draft(
     extent = Extent(
         ((len(look.samples[0].table),),), pace.rate_hz, 1, look.has_labels, look.has_splits
     )
-    rate_hz, is_held, doubt = _rate(pace)
+    rate_hz, is_held, doubt = _chosen_rate(pace, wishes.rate_hz)
     told = [f"{column} ({reason})" for column, reason in left_out.items()]
     told += [f"{column} (too many channels)" for column in surplus]
     draft = Draft(
@@ -131,7 +144,12 @@ def _first_draft(
 
 
 def _second_draft(
-    root: Path, draft: Draft, look: Look, columns: Sequence[Column], recordings: Sequence[Recording]
+    root: Path,
+    draft: Draft,
+    look: Look,
+    columns: Sequence[Column],
+    recordings: Sequence[Recording],
+    wishes: Wishes,
 ) -> Draft:
     """Return the draft with limits and lengths that fit all that could be read."""
     seen = [
@@ -148,7 +166,8 @@ def _second_draft(
     clean = sum(not recording.info.is_disturbed for recording in recordings) or len(segments)
     extent = Extent(tuple(segments), draft.rate_hz, clean, look.has_labels, look.has_splits)
     patch_steps = load_config(root).twin.patch_steps
-    return replace(draft, guesses=guesses, extent=extent, plan=make_plan(extent, patch_steps))
+    plan = make_plan(extent, patch_steps, wishes)
+    return replace(draft, guesses=guesses, extent=extent, plan=plan)
 
 
 def _guesses(look: Look, columns: Sequence[Column]) -> tuple[list[Guess], PoseGuess | None]:
@@ -174,7 +193,8 @@ def _heading(guess: Guess, pose: PoseGuess) -> Guess:
         return replace(guess, output=False, doubts=())
     unit = pose.heading_unit or guess.unit
     most = heading_limit(unit)
-    doubts = ("unit guessed from the range",) if pose.heading_unit else ()
+    guessed = pose.heading_unit or "unit guessed from the range" in guess.doubts
+    doubts = ("unit guessed from the range",) if guessed else ()
     return replace(guess, unit=unit, output=False, low=-most, high=most, doubts=doubts)
 
 
@@ -184,6 +204,18 @@ def _place(guess: Guess) -> Guess:
         return replace(guess, output=True)
     doubts = tuple("unit guessed" if doubt == "unit unknown" else doubt for doubt in guess.doubts)
     return replace(guess, output=True, unit="m", doubts=doubts)
+
+
+def _chosen_rate(pace: Pace, wish_hz: float | None) -> tuple[float, bool, str]:
+    """Return the rate that is wished for, or else the one that suits the recordings."""
+    if wish_hz is None:
+        return _rate(pace)
+    if wish_hz > 1.009 * pace.slowest_hz:
+        raise OdisarError(
+            f"--rate-hz {wish_hz:g}: samples come at {pace.slowest_hz:.4g} Hz; give no more"
+        )
+    is_recorded = pace.is_even and abs(wish_hz / pace.rate_hz - 1) < 0.001
+    return wish_hz, not is_recorded, ""
 
 
 def _rate(pace: Pace) -> tuple[float, bool, str]:

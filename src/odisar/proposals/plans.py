@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from odisar.errors import OdisarError
+
 _FRACTIONS_FROM = 10
 _CLEAN_NEEDED = 8
 _DISJOINT_WINDOWS = 100
@@ -84,16 +86,44 @@ class Plan:
         return self.context + self.horizon
 
 
+@dataclass(frozen=True)
+class Wishes:
+    """What the user chose up front: the rate [Hz] and the window [s]; None is left to the plan."""
+
+    rate_hz: float | None = None
+    context_s: float | None = None
+    horizon_s: float | None = None
+
+    def check(self) -> None:
+        """Raise OdisarError where a wish is not above 0."""
+        for name, value in vars(self).items():
+            if value is not None and not 0 < value < math.inf:
+                option = name.replace("_", "-")
+                raise OdisarError(f"--{option} {value:g}: give a number above 0")
+
+    def windows(self, patch_steps: int, rate_hz: float) -> list[tuple[int, int]]:
+        """Return contexts and horizons to try, in steps, the longest first."""
+        unit = patch_steps * math.ceil(5 / patch_steps)
+        context, horizon = (
+            None if wish is None else max(round(wish * rate_hz / patch_steps), 1) * patch_steps
+            for wish in (self.context_s, self.horizon_s)
+        )
+        tried = [(context or unit * usual, horizon or unit * ahead) for usual, ahead in _WINDOWS]
+        return list(dict.fromkeys(tried))
+
+
+_NO_WISHES = Wishes()
+
+
 def shortest_plan(patch_steps: int, *, has_splits: bool) -> Plan:
     """Return a plan that asks nothing of recordings, to read them before one is made."""
     kind = "metadata" if has_splits else "fractions"
     return Plan(kind, patch_steps, patch_steps, None, 0, patch_steps, patch_steps, "")
 
 
-def make_plan(extent: Extent, patch_steps: int) -> Plan:
+def make_plan(extent: Extent, patch_steps: int, wishes: Wishes = _NO_WISHES) -> Plan:
     """Return the longest windows that leave enough of them to learn and to judge by."""
-    unit = patch_steps * math.ceil(5 / patch_steps)
-    windows = [(unit * context, unit * horizon) for context, horizon in _WINDOWS]
+    windows = wishes.windows(patch_steps, extent.rate_hz)
     if extent.has_splits or (
         len(extent.segments) >= _FRACTIONS_FROM and extent.clean >= _CLEAN_NEEDED
     ):

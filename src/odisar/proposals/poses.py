@@ -4,8 +4,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from odisar.proposals.channels import Guess
 from odisar.proposals.columns import Column
+from odisar.proposals.guesses import Guess
 from odisar.proposals.units import words
 
 _PLACE_WORDS = frozenset({"position", "pos", "pose", "odom", "odometry", "loc", "location", "robot",

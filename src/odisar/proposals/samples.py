@@ -1,6 +1,6 @@
 """The start of a recording, as far as a proposal needs it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import pandas as pd
 
 from odisar.config.formats import CsvFormat
 from odisar.errors import OdisarError
+from odisar.proposals.tables import printable, shortened, table
 
 #: No more of one file is looked at for a proposal; the quality check reads all of it.
 HEAD_BYTES = 8 * 1024**2
@@ -45,6 +46,19 @@ class Sample:
     def signature(self) -> tuple[object, ...]:
         """What files have in common that one declaration can read."""
         return (self.layout, self.encoding, self.header_line, tuple(self.obstacles))
+
+
+def none_usable(faults: Sequence[tuple[str, str, str]]) -> str:
+    """Return what is wrong with every file: (name, problem, what to do) where each is known."""
+    if len(faults) == 1:
+        name, problem, remedy = map(printable, faults[0])
+        return f"{name}: {problem}" + (f"; {remedy}" if remedy else "")
+    header = ("file", "problem", "what to do")
+    shown = [(shortened(name, 40), problem, remedy) for name, problem, remedy in faults]
+    width = 3 if any(remedy for _, _, remedy in shown) else 2
+    rows = [row[:width] for row in shown]
+    text = table(header[:width], rows, wrapped=tuple(range(1, width)))
+    return f"none of the {len({name for name, _, _ in faults})} recordings can be read:\n{text}"
 
 
 def names(items: list[str] | tuple[str, ...], shown: int = 6) -> str:

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from odisar.proposals.conversion import quoted
-from odisar.proposals.inspection import count, in_words, plural
+from odisar.proposals.inspection import counts_of, plural
 from odisar.proposals.new_case import Proposal, gap_free_hours, unsure_of
-from odisar.proposals.tables import WIDTH
+from odisar.proposals.samples import names
+from odisar.proposals.tables import WIDTH, printable, shortened
 from odisar.recordings.quality import Finding
 
 _LISTED = 12
@@ -38,7 +39,7 @@ def _list(title: str, items: Sequence[str], *, every: bool = False) -> str:
     shown = list(items if every else items[:_LISTED])
     if len(items) > len(shown):
         shown.append(f"and {len(items) - len(shown)} more")
-    lines = [textwrap.fill(item, WIDTH, initial_indent="  - ", subsequent_indent="    ")
+    lines = [textwrap.fill(printable(item), WIDTH, initial_indent="  - ", subsequent_indent="    ")
              for item in shown]  # fmt: skip
     return "\n".join([f"{title}:", *lines])
 
@@ -48,7 +49,7 @@ def _quality(proposal: Proposal) -> str:
     findings = [item for item in proposal.result.findings if item.column not in left_out]
     if not findings:
         return "Quality check: no findings."
-    counts = in_words(*count(findings))
+    counts = counts_of(findings)
     kinds: dict[tuple[str, str, str], list[Finding]] = {}
     for finding in sorted(findings, key=lambda item: item.severity):
         kinds.setdefault((finding.severity, finding.column, finding.problem), []).append(finding)
@@ -59,13 +60,16 @@ def _kind(group: Sequence[Finding]) -> str:
     first = group[0]
     place = Path(first.file).name + (f", row {first.row}" if first.row is not None else "")
     place += f", {first.column}" if first.column else ""
+    entries = [item.value for item in group if item.value and not item.column]
+    if first.row is None and entries:  # about an entry of the folder, or why a bag can't be read
+        place += f", {names([shortened(entry, 60) for entry in entries], 4)}"
     files = len({finding.file for finding in group})
     more = f" (in {files} files)" if files > 1 else ""
-    return f"{first.severity}: {place}: {first.problem}{more}; {first.remedy}"
+    return printable(f"{first.severity}: {place}: {first.problem}{more}; {first.remedy}")
 
 
 def _next(proposal: Proposal, folder: Path, *, written: bool) -> str:
-    where = quoted(folder)
+    where = printable(quoted(folder))
     steps = []
     if written:
         steps.append(f"edit the lines marked `# ?` in params.yaml (profiles.{proposal.name})")

@@ -9,7 +9,7 @@ _GAP = "  "
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], wrapped: Sequence[int] = ()) -> str:
     """Return rows below a header; the columns numbered in ``wrapped`` share what width is left."""
-    cells = [[_printable(cell) for cell in row] for row in (header, *rows)]
+    cells = [[printable(cell) for cell in row] for row in (header, *rows)]
     widths = [max(1, *(len(row[i]) for row in cells)) for i in range(len(header))]
     widths = _fitted(widths, wrapped)
     lines = [line for row in cells for line in _lines(row, widths)]
@@ -40,7 +40,8 @@ def _lines(row: Sequence[str], widths: Sequence[int]) -> list[str]:
     ]
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
+    """Return text without what a file could steer a terminal with."""
     return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from odisar.errors import OdisarError
+from odisar.proposals.dates import DateFormat, find_dates
 from odisar.proposals.samples import Sample, names
 from odisar.proposals.units import words
 
@@ -43,13 +44,17 @@ SECONDS_DOUBT = "taken for seconds"
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """The time column: ``scale_s`` seconds a unit; ``is_text`` where it holds dates as text."""
+    """The time column: ``scale_s`` seconds a unit; ``is_text`` where it holds dates as text.
+
+    ``dates`` says how these are written.
+    """
 
     name: str
     scale_s: float
     is_text: bool
     is_epoch: bool
     doubt: str
+    dates: DateFormat | None = None
 
     @property
     def unit_name(self) -> str:
@@ -63,10 +68,7 @@ class TimeColumn:
 
     def seconds(self, sample: Sample) -> NDArray[np.float64]:
         """Return (row,) the times of a sample in seconds, NaN where there is none."""
-        column = sample.table[self.name]
-        if self.is_text:
-            return _text_seconds(column)
-        return column.to_numpy(dtype=np.float64) * self.scale_s
+        return _seconds(sample, self.name, self.dates) * self.scale_s
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,17 @@ def find_time(samples: Sequence[Sample], columns: Sequence[str]) -> TimeColumn:
     OdisarError
         If no column rises from row to row, with the way out.
     """
+    dates = {
+        name: find_dates(name, samples)
+        for name in columns
+        if not any(_is_numeric(sample, name) for sample in samples)
+    }
     ranked = sorted(
-        ((_score(name, samples), -place, name) for place, name in enumerate(columns)), reverse=True
+        (
+            (_score(name, samples, dates.get(name)), -place, name)
+            for place, name in enumerate(columns)
+        ),
+        reverse=True,
     )
     best = ranked[0] if ranked else (0.0, 0, "")
     score, _, name = best
@@ -103,13 +114,12 @@ def find_time(samples: Sequence[Sample], columns: Sequence[str]) -> TimeColumn:
     below = samples[0].units.get(name, "")
     told = f"{name} [{below}]" if below else name
     scale_s, is_epoch, doubt = (1.0, False, "") if is_text else _scale(told, first)
-    found = TimeColumn(name, scale_s, is_text, is_epoch, doubt)
     others = [other for points, _, other in ranked[1:] if points >= score - 0.5 and points > 1]
     if others:
         doubt = f"or is it {names(others, 3)}?"
     elif score < 2:
         doubt = "the only column that rises from row to row"
-    return TimeColumn(name, scale_s, is_text, is_epoch, doubt or found.doubt)
+    return TimeColumn(name, scale_s, is_text, is_epoch, doubt, dates.get(name))
 
 
 def _is_numeric(sample: Sample, name: str) -> bool:
@@ -122,11 +132,11 @@ def _first_number(sample: Sample, name: str) -> float:
     return float(known.iloc[0]) if len(known) else 0.0
 
 
-def _score(name: str, samples: Sequence[Sample]) -> float:
+def _score(name: str, samples: Sequence[Sample], dates: DateFormat | None) -> float:
     """Return how much a column looks like time: above 0 if it rises, above 2 if called so."""
     parts = words(name)
     called = any(part in _TIME_WORDS for part in parts) or _unit_word(name) == "s" == name
-    if not all(_rises(sample, name, lenient=called) for sample in samples):
+    if not all(_rises(_seconds(sample, name, dates), lenient=called) for sample in samples):
         return 0.0
     exact = bool(parts) and parts[0] in _TIME_WORDS
     if not called:
@@ -135,12 +145,16 @@ def _score(name: str, samples: Sequence[Sample]) -> float:
     return 2.0 + exact + (1.0 if numeric else 0.0) + 0.5 * (_unit_word(name) in _UNITS)
 
 
-def _rises(sample: Sample, name: str, *, lenient: bool) -> bool:
-    """Return whether a column rises from row to row; one called time may do so less well."""
+def _seconds(sample: Sample, name: str, dates: DateFormat | None) -> NDArray[np.float64]:
+    """Return (row,) values of a column as numbers, NaN where there is none."""
+    column = sample.table[name]
     if _is_numeric(sample, name):
-        values = sample.table[name].to_numpy(dtype=np.float64)
-    else:
-        values = _text_seconds(sample.table[name])
+        return column.to_numpy(dtype=np.float64)
+    return dates.seconds(column) if dates else np.full(len(column), np.nan)
+
+
+def _rises(values: NDArray[np.float64], *, lenient: bool) -> bool:
+    """Return whether a column rises from row to row; one called time may do so less well."""
     known = values[~np.isnan(values)]
     if len(known) < 2 or len(known) < 0.8 * len(values):
         return False
@@ -149,7 +163,9 @@ def _rises(sample: Sample, name: str, *, lenient: bool) -> bool:
 
 
 def _counts_rows(sample: Sample, name: str) -> bool:
-    return counts_up(sample.table[name].to_numpy(dtype=np.float64, na_value=np.nan))
+    return _is_numeric(sample, name) and counts_up(
+        sample.table[name].to_numpy(dtype=np.float64, na_value=np.nan)
+    )
 
 
 def counts_up(values: NDArray[np.floating[Any]]) -> bool:
@@ -172,20 +188,6 @@ def _scale(name: str, first: float) -> tuple[float, bool, str]:
         if first > above and (told in (None, scale_s)):
             return scale_s, True, "" if told else "its numbers look like a clock since 1970"
     return (1.0, False, SECONDS_DOUBT) if told is None else (told, False, "")
-
-
-def _text_seconds(column: "pd.Series[Any]") -> NDArray[np.float64]:
-    """Return (row,) seconds of dates or times of day in text, NaN where there is none."""
-    text = column.astype(str)
-    try:
-        first = pd.to_datetime(text.iloc[:20], format="mixed", errors="coerce", utc=True)
-        if first.notna().mean() < 0.8:
-            return np.full(len(text), np.nan)
-        moments = pd.to_datetime(text, format="mixed", errors="coerce", utc=True)
-    except (ValueError, TypeError, OverflowError):
-        return np.full(len(text), np.nan)
-    elapsed = moments - moments.min()
-    return np.asarray(elapsed.dt.total_seconds(), dtype=np.float64)
 
 
 def measure_pace(times: Sequence[NDArray[np.float64]]) -> Pace:

@@ -19,7 +19,7 @@ _WRITTEN: Mapping[str, str] = {
     "kelvin": "K", "pa": "Pa", "kpa": "kPa", "hpa": "hPa", "bar": "bar", "mbar": "mbar",
     "kw": "kW", "watt": "W", "watts": "W", "volt": "V", "volts": "V", "mv": "mV", "amp": "A",
     "amps": "A", "ampere": "A", "ma": "mA", "kg": "kg", "newton": "N", "gauss": "G", "ut": "µT",
-    "lpm": "l/min",
+    "lpm": "l/min", "°c": "°C", "°f": "°F", "%": "%", "prozent": "%", "grad/s": "deg/s",
 }  # fmt: skip
 
 # Single letters are units only where an underscore sets them apart: "x_m", "speed_m_s".
@@ -27,6 +27,10 @@ _LETTERS: Mapping[str, str] = {"m": "m", "v": "V", "a": "A", "w": "W", "n": "N",
 
 #: Suffixes that make a letter before them a unit: "_m_s", "_deg_s", "_m_s2", "_rad_s".
 _PAIRS = re.compile(r"[_\s.]((?:m|km|deg|rad)_(?:s2|s|h))$", re.IGNORECASE)
+
+
+# Signs that are units wherever a name ends in them: "Temp °C", "Ventil%".
+_SIGNS = re.compile(r"(°C|°F|°/s|°|%)\s*$", re.IGNORECASE)
 
 
 def unit_of(name: str, below: str = "") -> tuple[str, bool]:
@@ -48,6 +52,9 @@ def unit_of(name: str, below: str = "") -> tuple[str, bool]:
 
 def _ending(name: str) -> tuple[str, bool]:
     """Return the unit at the end of a name, and whether it is sure to be one."""
+    sign = _SIGNS.search(name)
+    if sign:
+        return _WRITTEN[sign[1].casefold()], True
     parts = re.split(r"[_\s./-]", name.strip())
     last = parts[-1].casefold()
     if len(parts) == 1:

@@ -13,6 +13,7 @@ from odisar.report.figures.baselines import (
     components_apart,
     has_components,
     has_groups,
+    has_strengths,
     protocols,
 )
 from odisar.report.figures.events import (
@@ -82,6 +83,7 @@ PLATES = (
         "Detection by strength of the disturbance under P2 (the score at t against 'disturbed at "
         "t'). Hollow diamonds, if any: published, with other data and another protocol.",
         baselines_by_strength,
+        applies=has_strengths,
     ),
     Plate(
         "baselines-by-scenario",

@@ -14,6 +14,7 @@ from odisar.config.cases import Case
 from odisar.config.loader import PARAMS_FILE, ConfigView, load_config
 from odisar.errors import OdisarError
 from odisar.recordings.quality import read_quality_table
+from odisar.report.ordering import ordered_values
 
 #: Sections of ``params.yaml`` that the report and its notebooks read.
 SECTIONS = (
@@ -224,7 +225,6 @@ class Results:
         judged = list(self.quadrants[self.quadrants.setup == setup].evaluated_on.unique())
         rows = [{"evaluated_on": OVERALL, "group": OVERALL, "is_apart": False}]
         for column in dict.fromkeys([*groups.group_by, *groups.apart]):
-            values = sorted(set(known[column].dropna().astype(str))) if column in known else []
             rows += [
                 {
                     "evaluated_on": value,
@@ -232,7 +232,7 @@ class Results:
                     "is_apart": column in groups.apart
                     and value not in groups.overall.get(column, []),
                 }
-                for value in values
+                for value in ordered_values(known, column)
                 if value in judged and value != OVERALL
             ]
         scenarios = pd.DataFrame(rows).drop_duplicates("evaluated_on")

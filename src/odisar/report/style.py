@@ -1,6 +1,7 @@
 """How every figure looks, and how it becomes the same bytes each time."""
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,6 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import seaborn as sns
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
@@ -66,8 +66,11 @@ EVENT_COLOUR = "#b8c4d6"
 
 _DPI = 150
 _TITLE_INCHES = 0.32
-#: Names up to here fit beside a panel of a small multiple.
-_LABEL_CHARACTERS = 14
+#: Lines of a channel's name beside a panel: broken at spaces and underscores, inside of a word
+#: only where it is longer than a line.
+_LABEL_LINES = re.compile(r".{1,14}$|.{1,13}[ _]|.{1,14}")
+_CHARACTER_INCHES = 0.078
+_ROW_GAP_INCHES = 0.12
 # Without these, the file would name the version of the program that drew it.
 _NO_METADATA = {"Software": None, "Creation Time": None}
 _SETTINGS: dict[Any, Any] = {
@@ -82,6 +85,8 @@ _SETTINGS: dict[Any, Any] = {
     "ytick.labelsize": 8,
     "hatch.linewidth": 0.5,
     "legend.frameon": False,
+    # An axis that says "+2.8e7" in its corner is not read.
+    "axes.formatter.useoffset": False,
 }
 
 
@@ -121,12 +126,22 @@ def _pixels(figure: Figure) -> NDArray[np.uint8]:
 
 
 def channel_label(name: str, unit: str) -> str:
-    """Return a channel's name, broken once where it can be, and its unit below, for an axis."""
-    sign = " " if " " in name else "_"
-    first, found, rest = name.partition(sign)
-    if not found or (sign == "_" and len(name) <= _LABEL_CHARACTERS):
-        return f"{name}\n[{unit}]"
-    return f"{first}{sign.strip()}\n{rest}\n[{unit}]"
+    """Return a channel's name in short lines, and its unit below, for an axis."""
+    lines = [line.strip() for line in _LABEL_LINES.findall(name)]
+    return "\n".join(lines if _holds_unit(name, unit) else [*lines, f"[{unit}]"])
+
+
+def _holds_unit(name: str, unit: str) -> bool:
+    """Whether a name has its unit in brackets or at its end; a letter there may be an axis."""
+    if any(part in name for part in (f"[{unit}]", f"({unit})")):
+        return True
+    return (len(unit) > 1 or not unit.isalnum()) and re.split("[ _]", name)[-1] == unit
+
+
+def row_inches(labels: Iterable[str], least: float = 1.05) -> float:
+    """Return how high a row of a small multiple is, for the longest line of the rows' labels."""
+    longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
+    return max(least, _CHARACTER_INCHES * longest + _ROW_GAP_INCHES)
 
 
 def detector_name(detector: str) -> str:
@@ -158,17 +173,3 @@ def strength_name(strength: float) -> str:
 def with_strength(scenario: str, strength: float) -> str:
     """Return a scenario's name with its strength, if it has one, for an axis."""
     return scenario if pd.isna(strength) else f"{scenario}, {strength_name(strength)}"
-
-
-def shade_events(axes: Axes, events: Sequence[tuple[float, float]], label: str = "event") -> None:
-    """Shade the disturbed stretches of a time axis, in minutes; only the first gets a label."""
-    for number, (start_s, end_s) in enumerate(events):
-        axes.axvspan(
-            start_s / 60,
-            end_s / 60,
-            color=EVENT_COLOUR,
-            alpha=0.55,
-            linewidth=0,
-            zorder=0,
-            label=label if number == 0 else None,
-        )

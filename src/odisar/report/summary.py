@@ -48,14 +48,32 @@ def _lead(results: Results, case: str) -> str:
     setup = results.setups_of(case)[0]
     known = results.examples.recordings
     known = known[known.setup == setup]
-    disturbed = int(known.is_disturbed.sum())
+    noun = "blocks" if given.splits.kind == "cross-fit" else "recordings"
     return (
         f"{given.title}: a twin trained on undisturbed recordings looks at the last "
         f"{context_s:g} s, forecasts the next {horizon_s:g} s, and reconstructs its own forecast. "
         "Where the reconstruction fails, the machine is taken to be out of distribution. It was "
-        f"tested on {disturbed} disturbed and {len(known) - disturbed} undisturbed recordings, "
-        "none of which the twin at test had seen."
+        f"tested on {_tested_on(known, noun)}, none of which the twin at test had seen."
     )
+
+
+def _tested_on(known: pd.DataFrame, noun: str) -> str:
+    """Return what a twin was tested on; copies with an injected fault are called that."""
+    copies = known[known.is_disturbed & (known.fault_channel != "")]
+    disturbed = int(known.is_disturbed.sum()) - len(copies)
+    clean = list(known[~known.is_disturbed].recording)
+    if copies.empty:
+        return f"{disturbed} disturbed and {len(clean)} undisturbed recordings"
+    # A copy is called by its original's name and its fault.
+    copied = {name for name in clean if copies.recording.str.startswith(f"{name}-").any()}
+    parts = [f"{len(copies)} copies of {len(copied)} undisturbed {noun} with injected faults"]
+    if disturbed:
+        parts.insert(0, f"{disturbed} disturbed {noun}")
+    if len(copied) == len(clean):
+        parts.append(f"the {len(clean)} themselves")
+    else:
+        parts.append(f"all {len(clean)} undisturbed {noun}")
+    return f"{', '.join(parts[:-1])}, and on {parts[-1]}"
 
 
 def _found(results: Results, setup: str) -> list[str]:

@@ -204,6 +204,8 @@ def operating(results: Results) -> Table:
 def quadrants(results: Results, setup: str) -> Table:
     """Return the quadrant shares, and those among disturbed and undisturbed windows."""
     own = results.quadrants[results.quadrants.setup == setup]
+    order = {name: place for place, name in enumerate(results.scenarios(setup).evaluated_on)}
+    own = own.sort_values("evaluated_on", key=lambda names: names.map(order), kind="stable")
     lines = []
     for (name, strength), part in own.groupby(
         ["evaluated_on", "strength"], sort=False, dropna=False

@@ -146,3 +146,47 @@ def test_a_pose_is_told_by_its_names(names, heading):
 def test_velocities_are_no_pose():
     columns, _ = columns_of(velocity_x=NOISE[0], velocity_y=NOISE[1], yaw_rate=NOISE[2])
     assert guess_pose(guess_channels(columns, {}), columns) is None
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["motor_1", "motor2", "pwm_left", "servo", "esc3", "valve_pct", "Ventil", "Solldruck [bar]",
+     "pressure setpoint", "thrust", "duty"],
+)  # fmt: skip
+def test_what_drives_a_machine_is_a_command(name):
+    assert guess(name, NOISE[0]).role == "command"
+
+
+@pytest.mark.parametrize("name", ["motor_current", "motor temperature", "valve position ist"])
+def test_what_is_measured_of_it_is_a_state(name):
+    assert guess(name, NOISE[0]).role == "state"
+
+
+def test_numbered_siblings_have_one_role_and_are_forecast_together():
+    idle = np.repeat(NOISE[0][:15], 20)
+    columns, _ = columns_of(wheel_1=NOISE[1], wheel_2=idle, wheel_3=NOISE[3], v=NOISE[4])
+    found = guess_channels(columns, {})
+    assert {(item.role, item.output) for item in found} == {("state", True)}
+    assert "forecast like wheel_1" in found[1].doubts
+    others = {f"{letter}_x": NOISE[i] for i, letter in enumerate("abcdef")}
+    columns, _ = columns_of(**others, **{f"wheel_{i}": NOISE[10 + i] for i in range(4)})
+    assert {item.output for item in guess_channels(columns, {})[6:]} == {False}
+
+
+@pytest.mark.parametrize("name", ["load_pct", "p_bar", "level %", "flow", "spannung", "n [1/min]"])
+def test_an_amount_that_is_never_negative_has_no_negative_limit(name):
+    assert guess(name, 150 + 30 * NOISE[0]).low == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit"),
+    [
+        ("yaw", (STEPS * 3.1) % 360 - 180, "deg"),
+        ("course", (STEPS * 3.1) % 360, "deg"),
+        ("heading", (STEPS * 0.07) % 6.28 - 3.14, "rad"),
+        ("heading", (STEPS * 0.01) % 6.28, "1"),
+        ("yaw_rate", (STEPS * 0.07) % 6.28 - 3.14, "1"),
+    ],
+)
+def test_a_direction_that_goes_all_around_tells_its_unit(name, values, unit):
+    assert guess(name, values).unit == unit

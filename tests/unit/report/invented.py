@@ -172,7 +172,9 @@ def write_examples(workspace: Workspace) -> None:
             "is_overall",
             "events",
         ],
-    ).to_csv(folder / "recordings.csv", index=False)
+    ).assign(disturbance="", fault_channel="", fault_size="").to_csv(
+        folder / "recordings.csv", index=False
+    )
     times = np.arange(0.0, 1200.0, 10.0)
     pd.concat(
         pd.DataFrame(
@@ -212,6 +214,35 @@ def add(results: Results, metric: str, detector: str, **columns: object) -> None
     """Add a P2 row to the detection table of set-up vessel-all."""
     row = {"setup": "vessel-all", "protocol": "P2", "metric": metric, "detector": detector}
     results.detection.loc[len(results.detection)] = pd.Series(row | columns)
+
+
+def with_faults(results: Results, *names: str) -> None:
+    """Add copies of the clean test recording with a fault, by kind and size, as "bias 1 sd"."""
+    known = results.examples.recordings
+    clean = known[known.recording == CLEAN]
+    for name in names:
+        kind, _, size = name.partition(" ")
+        copy = clean.assign(
+            recording=f"{CLEAN}-{name}",
+            is_disturbed=True,
+            is_overall=True,
+            events=json.dumps([EVENT]),
+            disturbance=kind,
+            fault_channel="Yaw Rate",
+            fault_size=size,
+        )
+        for _, row in copy.iterrows():
+            known.loc[len(known)] = row
+
+
+def since_1970(results: Results) -> float:
+    """Let the recordings' clocks begin far from zero; return at which second."""
+    start_s = 1.7e9
+    examples = results.examples
+    examples.traces["time_s"] += start_s
+    examples.forecasts[["time_s", "issued_s"]] += start_s
+    examples.chosen["vessel"]["disturbed"]["events"] = [[start_s + time for time in EVENT]]
+    return start_s
 
 
 def without_disturbed(results: Results) -> None:

@@ -1,14 +1,19 @@
 import numpy as np
+import pandas as pd
 import pytest
 
 from odisar.artifacts import write_json
+from odisar.report.clock import clock
 from odisar.report.figures.baselines import baselines_by_strength
+from odisar.report.figures.events import fault_shares, forecast_examples
 from odisar.report.figures.learning import tuning_trials
 from odisar.report.figures.quadrants import quadrant_distribution
+from odisar.report.figures.recordings import recordings_overview
 from odisar.report.gallery import PLATES, draw_figures
-from odisar.report.style import QUADRANTS, detector_colour, save_figure
+from odisar.report.style import QUADRANTS, channel_label, detector_colour, save_figure
 
-from .invented import study, without_disturbed
+from .invented import CLEAN, DISTURBED, since_1970, study, with_faults, without_disturbed
+from .layout import overlaps
 
 
 def test_every_figure_that_applies_is_drawn_and_old_ones_go(results, tmp_path):
@@ -28,6 +33,92 @@ def test_no_panel_is_left_empty(results, plate):
         pytest.skip("does not apply to these results")
     for axes in plate.draw(results, subject).axes:
         assert axes.has_data() or axes.texts
+
+
+@pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
+def test_no_legend_title_or_label_lies_over_another(results, plate):
+    subject = "vessel-all" if plate.scope == "setup" else "vessel"
+    if not plate.applies(results, subject):
+        pytest.skip("does not apply to these results")
+    assert overlaps(plate.draw(results, subject)) == []
+
+
+def test_tuning_trials_have_room_for_their_legend(results):
+    assert overlaps(tuning_trials(results)) == []
+
+
+def test_labels_that_lie_over_one_another_are_found(results):
+    figure = recordings_overview(results, "vessel")
+    figure.axes[0].set_ylabel("a name far longer than its panel is high, and unbroken")
+    assert any("a name far longer" in pair for pair in overlaps(figure))
+
+
+def test_long_channel_names_have_room(results):
+    long = "imu_angular_velocity_of_the_base_x"
+    traces = results.examples.traces
+    traces.loc[traces.channel == "Yaw Rate", "channel"] = long
+    case = results.config.cases["vessel"]
+    channels = [item.model_copy(update={"name": long}) for item in case.channels]
+    results.config.cases["vessel"] = case.model_copy(update={"channels": channels})
+    assert overlaps(recordings_overview(results, "vessel")) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "label"),
+    [
+        ("Surge Speed", "m/s", "Surge Speed\n[m/s]"),
+        ("imu_angular_velocity_x", "rad/s", "imu_angular_\nvelocity_x\n[rad/s]"),
+        ("Durchfluss [l/min]", "l/min", "Durchfluss\n[l/min]"),
+        ("Druck (bar)", "bar", "Druck (bar)"),
+        ("Ventil_Soll_%", "%", "Ventil_Soll_%"),
+        ("pump_A", "A", "pump_A\n[A]"),
+        ("Abgastemperaturmittelwert", "K", "Abgastemperatu\nrmittelwert\n[K]"),
+    ],
+)
+def test_a_channel_is_labelled_in_short_lines_with_its_unit_once(name, unit, label):
+    assert channel_label(name, unit) == label
+
+
+def test_short_spans_are_told_in_seconds_and_long_ones_in_minutes():
+    assert clock(100.0, 30.0).label == "time since start [s]"
+    assert clock(100.0, 30.0).at(112.0) == pytest.approx(12.0)
+    assert clock(100.0, 600.0).label == "time since start [min]"
+    assert clock(100.0, 600.0).at(160.0) == pytest.approx(1.0)
+
+
+def test_time_is_told_since_the_first_sample_of_the_recording(results):
+    since_1970(results)
+    first = recordings_overview(results, "vessel").axes[0]
+    assert first.lines[0].get_xdata()[0] == 0.0
+    assert first.patches[0].get_x() == pytest.approx(7.0)
+    panel = forecast_examples(results, "vessel-all").axes[0]
+    assert panel.get_title() == "issued at 600.0 s"
+    assert panel.get_xlim()[1] == pytest.approx(660.0)
+
+
+def test_strengths_are_drawn_only_where_there_are_any(results, tmp_path):
+    for table in (results.detection, results.quadrants, results.attribution):
+        table["strength"] = np.nan
+    names = {item.path.stem for item in draw_figures(results, tmp_path / "figures")}
+    assert "baselines-by-strength-vessel-all" not in names
+    assert "protocols-vessel-all" in names
+    # The notebook draws it for every set-up.
+    assert baselines_by_strength(results, "vessel-all").axes[0].has_data()
+
+
+def test_faults_are_told_by_kind_then_size(results, workspace):
+    with_faults(results, "stuck", "delay 1.2 s", "bias 10 sd", "bias 2 sd")
+    scores = results.scores("vessel-all")
+    copies = set(results.examples.recordings.recording) - {CLEAN, DISTURBED}
+    pd.concat([scores.assign(recording=name) for name in copies]).to_parquet(
+        workspace.scores("vessel-all")
+    )
+    assert list(fault_shares(results, "vessel-all").index) == [
+        "bias 2 sd",
+        "bias 10 sd",
+        "delay 1.2 s",
+        "stuck",
+    ]
 
 
 def test_a_figure_is_the_same_bytes_twice_and_names_no_program(results, tmp_path):

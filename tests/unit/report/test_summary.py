@@ -6,7 +6,7 @@ from odisar.report.failings import failings
 from odisar.report.load import Results
 from odisar.report.summary import summarise
 
-from .invented import add, change
+from .invented import DISTURBED, add, change, with_faults
 
 
 def said(results: Results) -> str:
@@ -113,6 +113,24 @@ def test_missed_events_and_late_alarms_are_told(results):
 def test_variance_that_does_not_separate_windows_is_told(results):
     results.quadrants["share_of_disturbed"] = results.quadrants["share_of_undisturbed"]
     assert "Monte Carlo variance does not separate" in said(results)
+
+
+def test_disturbed_recordings_are_counted_as_such(results):
+    assert "tested on 1 disturbed and 1 undisturbed recordings, none" in summarise(results).lead[0]
+
+
+def test_copies_with_faults_are_not_called_disturbed_recordings(results):
+    known = results.examples.recordings
+    with_faults(results, "bias 1 sd", "stuck")
+    assert (
+        "tested on 1 disturbed recordings, 2 copies of 1 undisturbed recordings with injected "
+        "faults, and on the 1 themselves, none"
+    ) in summarise(results).lead[0]
+    known.loc[known.recording == DISTURBED, "is_disturbed"] = False
+    assert (
+        "tested on 2 copies of 1 undisturbed recordings with injected faults, and on all 2 "
+        "undisturbed recordings"
+    ) in summarise(results).lead[0]
 
 
 def test_the_summary_says_how_sure_it_is(results):

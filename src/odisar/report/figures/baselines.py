@@ -89,6 +89,11 @@ def has_components(results: Results, setup: str) -> bool:
     return bool(results.scenarios(setup).is_apart.any())
 
 
+def has_strengths(results: Results, setup: str) -> bool:
+    """Whether anything that a set-up was judged on has a strength."""
+    return bool(pd.notna(results.strengths(setup)[-1]))
+
+
 def has_groups(results: Results, setup: str) -> bool:
     """Whether a set-up was judged by scenario."""
     return len(results.scenarios(setup)) > 1

@@ -10,17 +10,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from odisar.report.clock import Clock, clock, shade_events, trace_of
 from odisar.report.load import Results, rows_of
+from odisar.report.ordering import size_key
 from odisar.report.style import (
     EVENT_COLOUR,
     QUADRANT_COLOURS,
     QUADRANT_HATCHES,
     channel_label,
     figure_style,
-    shade_events,
+    row_inches,
     with_strength,
 )
 
+#: Height of a state's row of blamed windows, with room for its name.
+_STATE_INCHES = 0.22
 _FORECAST, _RECONSTRUCTION, _TRUTH = "#D55E00", "#009E73", "#222222"
 
 
@@ -32,12 +36,15 @@ def forecast_examples(results: Results, setup: str) -> Figure:
     forecasts = forecasts[forecasts.setup == setup]
     states = list(dict.fromkeys(forecasts.state))
     issued = sorted(forecasts.issued_s.unique())
-    traces = results.examples.traces
-    traces = traces[(traces.case == case) & (traces.recording == example["recording"])]
+    traces = trace_of(results, case, example["recording"])
     window = results.case_of(setup).window
-    context_s = window.context_steps / results.case_of(setup).rate_hz
+    rate_hz = results.case_of(setup).rate_hz
+    context_s = window.context_steps / rate_hz
+    time = clock(float(traces.time_s.min()), context_s + window.horizon_steps / rate_hz)
+    labels = [channel_label(state, example["units"][state]) for state in states]
     with figure_style():
-        figure = Figure(figsize=(3.2 * len(issued) + 0.5, 1.15 * len(states) + 1.2))
+        height = row_inches(labels, 1.15) * len(states) + 1.2
+        figure = Figure(figsize=(max(3.2 * len(issued) + 0.5, 6.8), height))
         grid = figure.subplots(len(states), len(issued), sharey="row", sharex="col", squeeze=False)
         for column, issued_s in enumerate(issued):
             here = forecasts[forecasts.issued_s == issued_s]
@@ -45,14 +52,13 @@ def forecast_examples(results: Results, setup: str) -> Figure:
                 axes = grid[row][column]
                 trace = traces[(traces.channel == state) & (traces.time_s >= issued_s - context_s)]
                 trace = trace[trace.time_s <= here.time_s.max()]
-                _forecast(axes, here[here.state == state], trace, issued_s)
-                shade_events(axes, _inside(example["events"], trace))
+                _forecast(axes, here[here.state == state], trace, issued_s, time)
+                shade_events(axes, _inside(example["events"], trace), time)
                 if column == 0:
-                    unit = example["units"][state]
-                    axes.set_ylabel(channel_label(state, unit))
-            axes.set_xlim((issued_s - context_s) / 60, float(here.time_s.max()) / 60)
-            grid[0][column].set_title(f"issued at {issued_s / 60:.1f} min")
-            grid[-1][column].set_xlabel("time [min]")
+                    axes.set_ylabel(labels[row])
+            axes.set_xlim(time.at(issued_s - context_s), time.at(float(here.time_s.max())))
+            grid[0][column].set_title(f"issued at {time.at(issued_s):.1f} {time.unit}")
+            grid[-1][column].set_xlabel(time.label)
         figure.align_ylabels()
         _forecast_legend(figure)
     return figure
@@ -64,15 +70,15 @@ def _inside(events: list[list[float]], trace: pd.DataFrame) -> list[tuple[float,
     return [(start, end) for start, end in cut if end > start]
 
 
-def _forecast(axes: Axes, forecast: pd.DataFrame, trace: pd.DataFrame, issued_s: float) -> None:
-    minutes = forecast.time_s.to_numpy() / 60
-    axes.plot(trace.time_s.to_numpy() / 60, trace.value.to_numpy(), color=_TRUTH, linewidth=0.8)
-    axes.fill_between(
-        minutes, forecast.low, forecast.high, color=_FORECAST, alpha=0.25, linewidth=0
-    )
-    axes.plot(minutes, forecast.forecast, color=_FORECAST, linewidth=1.3)
-    axes.plot(minutes, forecast.reconstruction, color=_RECONSTRUCTION, linewidth=1.1, ls="--")
-    axes.axvline(issued_s / 60, color="black", linewidth=0.7, linestyle=":")
+def _forecast(
+    axes: Axes, forecast: pd.DataFrame, trace: pd.DataFrame, issued_s: float, time: Clock
+) -> None:
+    ahead = time.all_at(forecast.time_s)
+    axes.plot(time.all_at(trace.time_s), trace.value, color=_TRUTH, linewidth=0.8)
+    axes.fill_between(ahead, forecast.low, forecast.high, color=_FORECAST, alpha=0.25, linewidth=0)
+    axes.plot(ahead, forecast.forecast, color=_FORECAST, linewidth=1.3)
+    axes.plot(ahead, forecast.reconstruction, color=_RECONSTRUCTION, linewidth=1.1, ls="--")
+    axes.axvline(time.at(issued_s), color="black", linewidth=0.7, linestyle=":")
 
 
 def _forecast_legend(figure: Figure) -> None:
@@ -99,33 +105,39 @@ def event_attribution(results: Results, setup: str) -> Figure:
     limits = results.limits(setup)[member]
     windows = results.assessments(setup)
     windows = windows[windows.recording == example["recording"]]
+    start_s = float(trace_of(results, case, example["recording"]).time_s.min())
+    time = clock(start_s, float(scores.time_s.max() - scores.time_s.min()))
+    states = results.case_of(setup).output_names
+    heights = (2.4, 0.3, max(1.6, _STATE_INCHES * len(states)))
     with figure_style():
-        figure = Figure(figsize=(8.4, 4.6))
+        figure = Figure(figsize=(8.4, sum(heights) + 0.3))
         score, strip, blame = figure.subplots(
-            3, 1, sharex=True, gridspec_kw={"height_ratios": [3, 0.35, 2]}
+            3, 1, sharex=True, gridspec_kw={"height_ratios": heights}
         )
-        score.plot(scores.time_s / 60, scores.odisar, color="#0072B2", linewidth=0.9, label="score")
+        score.plot(
+            time.all_at(scores.time_s), scores.odisar, color="#0072B2", linewidth=0.9, label="score"
+        )
         score.axhline(limits["sigma"]["odisar"], color="black", ls="--", lw=0.9, label="threshold")
         score.axhline(
             limits["operating"]["odisar"], color="#777777", ls=":", lw=1.1, label="alarm threshold"
         )
-        shade_events(score, example["events"])
+        shade_events(score, example["events"], time)
         score.set_ylabel("reconstruction error\n[scaled units]")
         score.legend(loc="upper left", ncols=4)
         top = max(float(scores.odisar.max()), limits["sigma"]["odisar"])
         score.set_ylim(0, 1.22 * max(top, limits["operating"]["odisar"]))
         score.set_title(f"{example['recording']}, set-up {setup}")
-        _quadrant_strip(strip, windows)
-        _blame(blame, windows, results.case_of(setup).output_names, figure)
-        blame.set_xlabel("time [min]")
+        _quadrant_strip(strip, windows, time)
+        _blame(blame, windows, states, time)
+        blame.set_xlabel(time.label)
     return figure
 
 
-def _quadrant_strip(axes: Axes, windows: pd.DataFrame) -> None:
+def _quadrant_strip(axes: Axes, windows: pd.DataFrame, time: Clock) -> None:
     for row in rows_of(windows):
         axes.axvspan(
-            row.issued_s / 60,
-            row.end_s / 60,
+            time.at(row.issued_s),
+            time.at(row.end_s),
             facecolor=QUADRANT_COLOURS[row.category],
             hatch=QUADRANT_HATCHES[row.category],
             edgecolor="white",
@@ -136,19 +148,22 @@ def _quadrant_strip(axes: Axes, windows: pd.DataFrame) -> None:
     axes.grid(visible=False)
 
 
-def _blame(axes: Axes, windows: pd.DataFrame, states: list[str], figure: Figure) -> None:
+def _blame(axes: Axes, windows: pd.DataFrame, states: list[str], time: Clock) -> None:
     """Draw a cell for each blamed state and window, darker for the more abnormal."""
     values = np.full((len(states), len(windows)), np.nan)
     for column, blamed in enumerate(windows.state_attribution):
         for state, error in blamed.items():
             values[states.index(state), column] = error
     if len(windows):
-        edges = np.append(windows.issued_s.to_numpy(), windows.end_s.iloc[-1]) / 60
+        edges_s = np.append(windows.issued_s, windows.end_s.iloc[-1])
         mesh = axes.pcolormesh(
-            edges, np.arange(len(states) + 1) - 0.5, np.ma.masked_invalid(values), cmap="cividis_r"
+            time.all_at(edges_s),
+            np.arange(len(states) + 1) - 0.5,
+            np.ma.masked_invalid(values),
+            cmap="cividis_r",
         )
         if np.isfinite(values).any():
-            figure.colorbar(mesh, ax=axes, label="error of state\n[scaled units]", pad=0.01)
+            axes.figure.colorbar(mesh, ax=axes, label="error of state\n[scaled units]", pad=0.01)
         else:
             centre: dict[str, Any] = {"ha": "center", "va": "center", "color": "#777777"}
             axes.text(0.5, 0.5, "no window was flagged", transform=axes.transAxes, **centre)
@@ -235,13 +250,26 @@ def fault_shares(results: Results, setup: str) -> pd.DataFrame:
         for start, end in json.loads(str(one.events)):
             active |= (own.time_s >= start) & (own.time_s < end)
         flagged = own.odisar[active] > limits[one.member]["sigma"]["odisar"]
-        name = f"{one.disturbance} {one.fault_size}".strip()
-        rows.append((name, one.fault_channel, flagged.sum(), active.sum()))
-    table = pd.DataFrame(rows, columns=["fault", "channel", "flagged", "seconds"])
+        rows.append(
+            (one.disturbance, one.fault_size, one.fault_channel, flagged.sum(), active.sum())
+        )
+    table = pd.DataFrame(rows, columns=["kind", "size", "channel", "flagged", "seconds"])
+    faults = sorted(set(zip(table.kind, table["size"], strict=True)), key=_fault_key)
+    table["fault"] = [_fault_name(row.kind, row.size) for row in rows_of(table)]
     summed = table.groupby(["fault", "channel"], sort=True)[["flagged", "seconds"]].sum()
     return (
         (summed.flagged / summed.seconds)
         .rename("share")
         .reset_index()
         .pivot_table(index="fault", columns="channel", values="share")
+        .reindex([_fault_name(*fault) for fault in faults])
     )
+
+
+def _fault_key(fault: tuple[str, str]) -> tuple[str, float, str]:
+    kind, size = fault
+    return kind, *size_key(size)
+
+
+def _fault_name(kind: str, size: str) -> str:
+    return f"{kind} {size}".strip()

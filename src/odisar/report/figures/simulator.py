@@ -4,7 +4,7 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 
-from odisar.report.style import channel_label, figure_style
+from odisar.report.style import channel_label, figure_style, row_inches
 from odisar.simulators.robot.plausibility import MapTraces
 
 #: Part of the trial that is drawn: zigzags and a turning circle fit in it [s].
@@ -17,16 +17,17 @@ _ZIGZAG_S = 400.0
 def sea_trial(traces: pd.DataFrame) -> Figure:
     """Draw measured beside simulated states of R/V Gunnerus (``validation_traces``)."""
     shown = traces[(traces.time_s >= _SHOWN_S[0]) & (traces.time_s <= _SHOWN_S[1])]
-    states = list(dict.fromkeys(shown.state))
+    units = dict(zip(shown.state, shown.unit, strict=True))
+    labels = [channel_label(state, unit) for state, unit in units.items()]
     with figure_style():
-        figure = Figure(figsize=(8.4, 1.35 * len(states) + 0.9))
-        grid = figure.subplots(len(states), 1, sharex=True)
-        for axes, state in zip(grid, states, strict=True):
+        figure = Figure(figsize=(8.4, row_inches(labels, 1.35) * len(units) + 0.9))
+        grid = figure.subplots(len(units), 1, sharex=True)
+        for axes, state, label in zip(grid, units, labels, strict=True):
             own = shown[shown.state == state]
             minutes = own.time_s / 60
             axes.plot(minutes, own.measured, color="#222222", linewidth=0.9, label="measured")
             axes.plot(minutes, own.simulated, color="#D55E00", lw=1.0, ls="--", label="simulated")
-            axes.set_ylabel(channel_label(state, own.unit.iloc[0]))
+            axes.set_ylabel(label)
         grid[-1].set_xlabel("time of the trial [min]")
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2)
