@@ -20,9 +20,11 @@ from odisar.recordings.schema import Recording
 from odisar.recordings.store import read_store
 from odisar.stages.runner import STAGES
 from odisar.twin.bundle import read_twin
+from odisar.windows.scaling import channel_std
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-SETUPS = ("vessel-all", "vessel-random")
+SETUPS = ("vessel-all", "waypoint")
+CASES = {"vessel-all": "vessel", "waypoint": "robot"}
 pytestmark = pytest.mark.slow
 
 
@@ -97,27 +99,28 @@ def test_every_assessment_fits_the_schema_and_every_test_recording_has_some(work
     rows = json.loads(workspace.assessments(setup).read_text())
     validator = jsonschema.Draft202012Validator(assessment_schema())
     assert not [row for row in rows if not validator.is_valid(row)]
-    test = [r for r in read_store(workspace.recordings("vessel")) if r.info.split == "test"]
+    recordings = read_store(workspace.recordings(CASES[setup]))
+    test = [recording for recording in recordings if recording.info.split == "test"]
     assert {row["recording"] for row in rows} == {recording.name for recording in test}
 
 
 @pytest.mark.parametrize("setup", SETUPS)
 def test_the_trained_twin_is_causal(workspace, setup):
     scorer = Scorer(read_twin(workspace.twin(setup)), 256, "cpu")
-    recording = next(
-        r for r in read_store(workspace.recordings("vessel")) if r.info.disturbance == "case-3"
-    )
+    recordings = read_store(workspace.recordings(CASES[setup]))
+    recording = next(r for r in recordings if r.info.disturbance in ("case-3", "noise"))
+    std = channel_std([recording])
     at = 500
     later, now = recording.values.copy(), recording.values.copy()
-    later[at + 1 :] += 5 * scorer.twin.scaler.std
-    now[at] += scorer.twin.scaler.std
+    later[at + 1 :] += 5 * std
+    now[at] += std
 
     def scores(values: np.ndarray) -> dict[str, np.ndarray]:
         changed = Recording(recording.name, recording.info, recording.time_s, values)
         return dict(scorer.score(changed, short_lead_steps=10).scores)
 
     before, unmoved, moved = scores(recording.values), scores(later), scores(now)
-    place = at - (scorer.twin.spec.context_steps - 1)
+    place = at - int(scorer.twin.spec.issue_positions((0, len(now)), 1)[0])
     for detector in DETECTORS:
         upto = slice(0, place + 1)
         np.testing.assert_array_equal(before[detector][upto], unmoved[detector][upto])

@@ -34,7 +34,7 @@ def log_bundle(
     """Log the model into a run; return its address and id."""
     # `mlflow.pyfunc.log_model` would need an active run, and end it.
     mlflow.set_experiment(experiment_id=client.get_run(run.run_id).info.experiment_id)
-    with _quietly():
+    with _quietly(), without_byte_code():
         info = Model.log(
             artifact_path=None,
             name=deployed.manifest.origin.setup,
@@ -71,7 +71,8 @@ def prove(folder: Path, deployed: Deployed) -> None:
     """Raise where the logged model, loaded anew, does not say what the bundle says."""
     path = list(sys.path)
     try:
-        said = mlflow.pyfunc.load_model(str(folder)).predict(deployed.example)
+        with without_byte_code():
+            said = mlflow.pyfunc.load_model(str(folder)).predict(deployed.example)
     finally:
         sys.path[:] = path
     if not said.equals(deployed.assess(deployed.example)):
@@ -113,6 +114,17 @@ def model_hash(folder: Path) -> str:
             digest.update(name.encode() + b"\0")
             digest.update(hashlib.sha256(files[name].read_bytes()).digest())
     return digest.hexdigest()
+
+
+@contextmanager
+def without_byte_code() -> Iterator[None]:
+    """Import without leaving byte code: a model's folder holds what was registered, no more."""
+    before = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.dont_write_bytecode = before
 
 
 @contextmanager

@@ -24,7 +24,14 @@ from odisar.deployment.manifest import manifest_hash
 from odisar.errors import OdisarError
 from odisar.tracking.champion import CHAMPION, Decision, Standing, decide
 from odisar.tracking.description import describe_version
-from odisar.tracking.logged_model import bundle_folder, download, log_bundle, model_hash, prove
+from odisar.tracking.logged_model import (
+    bundle_folder,
+    download,
+    log_bundle,
+    model_hash,
+    prove,
+    without_byte_code,
+)
 from odisar.tracking.runs import (
     TrackedRun,
     content_key,
@@ -122,7 +129,8 @@ def load_model(root: Path, name: str, alias_or_version: str) -> Any:
     # The model imports from its folder for as long as the process runs.
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     _fetch(version, folder)
-    return mlflow.pyfunc.load_model(str(folder))
+    with without_byte_code():
+        return mlflow.pyfunc.load_model(str(folder))
 
 
 def promote(root: Path, name: str, version_number: str) -> str:
