@@ -24,11 +24,11 @@ def sniff(tmp_path):
     return sniff_content
 
 
-@pytest.mark.parametrize("separator", SIGNS)
-@pytest.mark.parametrize("decimal", ["point", "comma"])
+@pytest.mark.parametrize(
+    ("separator", "decimal"),
+    [(s, d) for s in SIGNS for d in ("point", "comma") if (s, d) != ("comma", "comma")],
+)
 def test_separator_and_decimal_sign_are_told_apart(sniff, separator, decimal):
-    if separator == decimal == "comma":
-        pytest.skip("a comma can't be both")
     sample = sniff(lines(SIGNS[separator], "." if decimal == "point" else ","))
     assert (sample.layout.separator, sample.layout.decimal) == (separator, decimal)
     assert sample.columns == ["t", "v", "w"]
