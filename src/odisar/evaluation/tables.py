@@ -1,38 +1,23 @@
 """Tables: every detector under every protocol on every group of recordings, with intervals."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from odisar.config.cases import Groups
 from odisar.config.judging import Judging
 from odisar.errors import OdisarError
 from odisar.evaluation.cells import Cell, cell_resampler, describe, disturbed_cells
-from odisar.evaluation.intervals import (
-    Interval,
-    Resampler,
-    bin_counts,
-    bin_edges,
-    shift_interval,
-)
-from odisar.evaluation.metrics import (
-    auroc_of_counts,
-    confusion_of_counts,
-    count_confusion,
-    count_levels,
-    tnr_of_counts,
-)
+from odisar.evaluation.intervals import Resampler
 from odisar.evaluation.operating import operating_rows, operating_table
-from odisar.evaluation.protocols import PROTOCOLS, Samples, take_samples
+from odisar.evaluation.protocols import PROTOCOLS, take_samples
 from odisar.evaluation.published import (
     PUBLISHED_PROTOCOLS,
     is_full_strength,
     published_values,
 )
+from odisar.evaluation.resampled import contributions, measure_detection
 from odisar.evaluation.scored import ORACLE, ScoredRecording
 from odisar.evaluation.window_tables import attribution_table, quadrant_table
 
@@ -151,76 +136,21 @@ def _detection_rows(
     for protocol in PROTOCOLS:
         samples = {i: take_samples(recordings[i], protocol, cfg) for i in sorted(used)}
         for detector in (*recordings[0].detectors, ORACLE):
-            parts = _contributions(samples, detector, cfg.bootstrap_bins)
+            parts = contributions(samples, detector, cfg.bootstrap_bins)
             for cell, resampler in zip(cells, resamplers, strict=True):
-                measured = _measure([parts[i] for i in cell.members], resampler)
-                rows += [
-                    {
-                        "evaluated_on": cell.evaluated_on,
-                        "strength": cell.strength_or_nan,
-                        "protocol": protocol,
-                        "detector": detector,
-                        "metric": metric,
-                        "value": value,
-                        "ci_low": interval[0],
-                        "ci_high": interval[1],
-                    }
-                    for metric, (value, interval) in measured.items()
-                ]
+                measured = measure_detection([parts[i] for i in cell.members], resampler)
+                for metric, item in measured.items():
+                    low, high = item.interval(resampler)
+                    rows.append(
+                        {
+                            "evaluated_on": cell.evaluated_on,
+                            "strength": cell.strength_or_nan,
+                            "protocol": protocol,
+                            "detector": detector,
+                            "metric": metric,
+                            "value": item.value,
+                            "ci_low": low,
+                            "ci_high": high,
+                        }
+                    )
     return rows
-
-
-@dataclass(frozen=True)
-class _Contribution:
-    """What one recording adds to every cell, for one protocol and detector.
-
-    (sample,) scores and labels; (2, bin) counts by label; (4,) counts by label and flag.
-    """
-
-    scores: NDArray[np.float64]
-    labels: NDArray[np.bool_]
-    binned: NDArray[np.float64]
-    confusion: NDArray[np.float64]
-
-
-def _contributions(
-    samples: Mapping[int, Samples], detector: str, bins: int
-) -> dict[int, _Contribution]:
-    pooled = [item.scores[detector] for item in samples.values()]
-    edges = bin_edges(np.concatenate(pooled) if pooled else np.zeros(0), bins)
-    return {
-        i: _Contribution(
-            scores=item.scores[detector],
-            labels=item.labels,
-            binned=bin_counts(item.scores[detector], item.labels, edges),
-            confusion=count_confusion(item.scores[detector] > 1.0, item.labels),
-        )
-        for i, item in samples.items()
-    }
-
-
-def _measure(
-    parts: Sequence[_Contribution], resampler: Resampler
-) -> dict[str, tuple[float, Interval]]:
-    """Return value and interval of every detection metric for the recordings of one cell."""
-    levels = count_levels(
-        np.concatenate([part.scores for part in parts]),
-        np.concatenate([part.labels for part in parts]),
-    )
-    binned = np.stack([part.binned for part in parts])
-    confusions = np.stack([part.confusion for part in parts])
-    undisturbed, disturbed = binned.sum(axis=0)
-    drawn = resampler.totals(binned)
-
-    measured: dict[str, tuple[float, Interval]] = {}
-    for metric, of_counts in (("auroc", auroc_of_counts), ("tnr_at_tpr95", tnr_of_counts)):
-        value = float(of_counts(*levels))
-        offset = value - float(of_counts(disturbed, undisturbed))
-        interval = resampler.interval(of_counts(drawn[:, 1], drawn[:, 0]))
-        measured[metric] = (value, shift_interval(interval, offset))
-
-    whole = confusion_of_counts(confusions.sum(axis=0))
-    resampled = confusion_of_counts(resampler.totals(confusions))
-    measured["f1_ind"] = (float(whole.f1_ind()), resampler.interval(resampled.f1_ind()))
-    measured["f1_ood"] = (float(whole.f1_ood()), resampler.interval(resampled.f1_ood()))
-    return measured
