@@ -23,7 +23,8 @@ from odisar.recordings.splits import assign_splits
 from odisar.twin.bundle import TrainedTwin
 from odisar.twin.devices import use_one_thread
 from odisar.twin.mc_dropout import draw_masks
-from odisar.twin.training import TrainingPlan, train_twin
+from odisar.twin.plan import TrainingPlan
+from odisar.twin.training import train_twin
 from odisar.windows.coordinates import PoseChannels, moved_from, pose_channels
 from odisar.windows.scaling import Scaler
 from odisar.windows.targets import recorded_states
@@ -50,6 +51,7 @@ def train(
         case.window.context_steps,
         case.window.horizon_steps,
         tuple(case.output_indices),
+        tuple(case.command_indices),
         (),
         pose_channels(case),
     )

@@ -16,7 +16,7 @@ from odisar.twin.mc_dropout import draw_forecasts, draw_masks
 from odisar.twin.transformer import TwinTransformer
 from odisar.windows.windowing import WindowSpec
 
-SPEC = WindowSpec(context_steps=60, horizon_steps=60, outputs=(1, 2, 3, 4, 5), known_ahead=())
+SPEC = WindowSpec(60, 60, outputs=(1, 2, 3, 4, 5), commands=(0,), known_ahead=())
 CHANNELS, BATCH, DRAWS = 6, 16, 20
 
 
@@ -32,6 +32,8 @@ def network(patch_steps: int) -> TwinTransformer:
         reconstruction_dim=128,
         dropout=0.1,
         detach_reconstruction=False,
+        closed_form_lags=10,
+        residual_forecast=False,
     )
     return TwinTransformer(config, SPEC, CHANNELS)
 

@@ -8,7 +8,8 @@ import torch
 from odisar.twin.bundle import TrainedTwin
 from odisar.twin.devices import use_one_thread
 from odisar.twin.mc_dropout import draw_masks
-from odisar.twin.training import TrainingPlan, train_twin
+from odisar.twin.plan import TrainingPlan
+from odisar.twin.training import train_twin
 from odisar.twin.transformer import TwinTransformer
 from odisar.windows.coordinates import PoseChannels
 from odisar.windows.scaling import Scaler
@@ -47,11 +48,16 @@ def trained_twin(
 
 @pytest.fixture(scope="session")
 def relative_twin(plan: TrainingPlan) -> TrainedTwin:
-    """Return a twin of random weights that takes speed and turn rate for x and y of a pose."""
+    """Return a twin of random weights that takes speed and turn rate for x and y of a pose.
+
+    Its heading is the command.
+    """
     pose = PoseChannels(x=1, y=2, heading=(0,), in_degrees=False)
     spec = replace(SPEC, pose=pose)
     torch.manual_seed(5)
-    network = TwinTransformer(plan.twin, spec, spec.feature_count(len(CHANNELS)))
-    scaler = Scaler.fit([make_recording(f"train-{i}") for i in range(6)], spec)
+    train = [make_recording(f"train-{i}") for i in range(6)]
+    scaler = Scaler.fit(train, spec)
+    network = TwinTransformer(plan.twin, spec, len(CHANNELS))
+    network.fit_closed_forms(WindowSet(train, scaler, spec))
     masks = draw_masks(network, 6, "all", 3)
     return TrainedTwin(network.eval(), plan.twin, spec, scaler, masks, CHANNELS)

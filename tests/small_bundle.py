@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 
 from odisar.capability.assessment import Assessment, Capability, Thresholds
-from odisar.capability.scoring import Scorer
+from odisar.capability.innovation_values import InnovationScoreValues
+from odisar.capability.scoring import DETECTORS, Scorer
 from odisar.config.cases import Case
 from odisar.deployment.bundle import write_bundle
 from odisar.deployment.deployed import CapabilitySettings, Example, ThresholdValues
@@ -14,6 +15,7 @@ from odisar.deployment.development import DevelopmentScore
 from odisar.deployment.manifest import Origin
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
+from small_innovations import fit_small_scores
 from small_system import CHANNELS, SPEC, make_recording
 
 MAX_ROWS = 2000
@@ -68,13 +70,15 @@ def small_case(**changes: object) -> Case:
     return Case.model_validate(values | changes)
 
 
-def small_settings(**changes: object) -> CapabilitySettings:
+def small_settings(twin: TrainedTwin, **changes: object) -> CapabilitySettings:
     """Return settings whose thresholds tell the small system's pushes apart."""
+    sigma = dict(zip(DETECTORS, (4.0, 4.0, 0.2, 1.0, 0.8), strict=True))
     values = {
-        "thresholds": ThresholdValues(reconstruction=0.2, variance=0.02),
+        "innovation": InnovationScoreValues.of(fit_small_scores(twin)),
+        "thresholds": ThresholdValues(score=4.0, reconstruction=0.2, variance=0.02),
         "threshold_sigmas": 3.0,
-        "sigma": {"odisar": 0.2, "rmse": 1.0, "rmse-short-lead": 0.8},
-        "operating": {"odisar": 0.25, "rmse": 1.2, "rmse-short-lead": 0.9},
+        "sigma": sigma,
+        "operating": {name: 1.2 * value for name, value in sigma.items()},
         "operating_pooled": False,
         "calibration_hours": 0.5,
         "attribution_top": 2,
@@ -95,8 +99,8 @@ def table_of(recording: Recording, *, named: bool = False) -> pd.DataFrame:
 
 
 def small_example() -> Example:
-    """Return 31 samples: a window and one more."""
-    table = table_of(make_recording("example", 31))
+    """Return 41 samples: a window, those until the first score, and one more."""
+    table = table_of(make_recording("example", 41))
     return Example(columns=list(table.columns), data=table.to_numpy().tolist())
 
 
@@ -109,7 +113,7 @@ def write_small_bundle(
         folder,
         twin,
         case or small_case(),
-        small_settings(),
+        small_settings(twin),
         Origin.model_validate(about | origin),
         small_example(),
     )
@@ -118,14 +122,10 @@ def write_small_bundle(
 
 def expected(twin: TrainedTwin, recording: Recording) -> list[Assessment]:
     """Return what the pipeline's own objects say of a recording."""
-    settings = small_settings()
-    scorer = Scorer(twin, settings.scoring_batch, "cpu")
-    limits = settings.thresholds
-    capability = Capability(
-        scorer,
-        Thresholds(limits.reconstruction, limits.variance),
-        attribution_top=settings.attribution_top,
-    )
+    settings = small_settings(twin)
+    scorer = Scorer(twin, settings.scoring_batch, "cpu", settings.innovation.build())
+    thresholds = Thresholds(**settings.thresholds.model_dump())
+    capability = Capability(scorer, thresholds, attribution_top=settings.attribution_top)
     scores = scorer.score(recording, short_lead_steps=3)
     return capability.assess(
         recording, scores, stride_steps=settings.report_stride_steps, step_s=1.0

@@ -5,10 +5,10 @@ import numpy as np
 from odisar.config.learning import TrainingConfig, TwinConfig
 from odisar.recordings.schema import Interval, Recording, RecordingInfo
 from odisar.seeding import generator
-from odisar.twin.training import TrainingPlan
+from odisar.twin.plan import TrainingPlan
 from odisar.windows.windowing import WindowSpec
 
-SPEC = WindowSpec(context_steps=20, horizon_steps=10, outputs=(1, 2), known_ahead=())
+SPEC = WindowSpec(context_steps=20, horizon_steps=10, outputs=(1, 2), commands=(0,), known_ahead=())
 CHANNELS = ("Command", "Speed", "Turn Rate")
 
 
@@ -42,6 +42,8 @@ def small_plan() -> TrainingPlan:
         reconstruction_dim=16,
         dropout=0.1,
         detach_reconstruction=False,
+        closed_form_lags=5,
+        residual_forecast=False,
     )
     training = TrainingConfig(
         batch_size=16,
@@ -50,6 +52,7 @@ def small_plan() -> TrainingPlan:
         steps_per_epoch=40,
         patience_epochs=3,
         gradient_clip=1.0,
+        weigh_loss=True,
         validation_stride_steps=10,
     )
     return TrainingPlan(twin, training, seed=11, accelerator="cpu")

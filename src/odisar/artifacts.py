@@ -75,6 +75,10 @@ class Workspace:
         """The one-file report."""
         return self.root / "reports/report.html"
 
+    def distribution(self, setup: str) -> Path:
+        """Return what calibration found of a set-up's predictive distributions."""
+        return self.calibrate / f"{setup}.distribution.json"
+
     def recordings(self, case: str) -> Path:
         """Return the store of a case's checked recordings."""
         return self.preprocess / case

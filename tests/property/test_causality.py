@@ -5,10 +5,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from odisar.capability.scoring import DETECTORS, ODISAR, Scorer
+from odisar.capability.scoring import CLOSED_FORM, DETECTORS, ODISAR
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from odisar.windows.scaling import channel_std
+from small_innovations import MEAN_STEPS, small_scorer
 from small_system import make_recording
 
 SAMPLES = 120
@@ -31,7 +32,7 @@ def first_position(twin: TrainedTwin) -> int:
 
 
 def all_scores(twin: TrainedTwin, values: np.ndarray, batch: int = 32) -> dict[str, np.ndarray]:
-    scores = Scorer(twin, batch, "cpu").score(with_values(values), short_lead_steps=LEAD)
+    scores = small_scorer(twin, batch).score(with_values(values), short_lead_steps=LEAD)
     return dict(scores.scores)
 
 
@@ -69,7 +70,7 @@ def test_no_score_depends_on_how_windows_are_batched(twin, batch):
 
 
 def test_the_variance_of_a_window_depends_on_nothing_later_or_beside_it(twin):
-    scorer = Scorer(twin, 32, "cpu")
+    scorer = small_scorer(twin, 32)
     positions = np.arange(40, 100, 7)
     whole = scorer.variances(with_values(RECORDING.values), positions)
     changed = RECORDING.values.copy()
@@ -82,6 +83,6 @@ def test_the_variance_of_a_window_depends_on_nothing_later_or_beside_it(twin):
 
 
 def test_the_last_sample_of_a_recording_is_scored(twin):
-    scores = Scorer(twin, 32, "cpu").score(RECORDING, short_lead_steps=LEAD)
+    scores = small_scorer(twin, 32).score(RECORDING, short_lead_steps=LEAD)
     assert scores.positions[-1] == SAMPLES - 1
     assert np.isfinite(scores.scores[ODISAR]).all()

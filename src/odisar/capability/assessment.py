@@ -12,16 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odisar.capability.attribution import top_states
+from odisar.capability.innovations import FloatArray
 from odisar.capability.quadrants import quadrant
-from odisar.capability.scoring import ODISAR, RecordingScores, Scorer
+from odisar.capability.scoring import ODISAR, RECONSTRUCTION, RecordingScores, Scorer
+from odisar.capability.signatures import Signatures, blamed_names, state_directions
 from odisar.errors import OdisarError
 from odisar.recordings.schema import Recording
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What calibration recordings allow: for the reconstruction error and for the variance."""
+    """What calibration recordings allow: for the score, the paper's score, and the variance."""
 
+    score: float
     reconstruction: float
     variance: float
 
@@ -31,8 +34,9 @@ class Assessment:
     """What the capability says of one forecast window (paper, Fig. JSON example).
 
     Steps count samples of the recording from 0, times are its own seconds; both name the forecast
-    horizon, which begins one step after the assessment was made (``issued_s``). Scores are in
-    scaled units; ``state_attribution`` is empty unless the window is OOD.
+    horizon, which begins one step after the assessment was made (``issued_s``). ``is_OOD`` is what
+    ``score`` says, that of the innovations up to then; the paper's own score, flag and attribution
+    stand beside it. Attributions are empty unless their score is above its threshold.
     """
 
     recording: str
@@ -43,12 +47,15 @@ class Assessment:
     start_s: float
     end_s: float
     is_OOD: bool  # noqa: N815 (the paper's key)
+    score: float
+    score_exceeds_threshold: bool
     reconstruction_error: float
     uncertainty_variance: float
     recon_exceeds_threshold: bool
     uncertainty_exceeds_threshold: bool
     category: str
     state_attribution: Mapping[str, float]
+    reconstruction_attribution: Mapping[str, float]
 
 
 class Capability:
@@ -69,62 +76,95 @@ class Capability:
         ``scores`` are the recording's own (``Scorer.score``), ``step_s`` the time between samples
         in seconds. Raises OdisarError where the capability has not been calibrated.
         """
-        if self._thresholds is None:
+        if self._thresholds is None or self._scorer.innovation_scores is None:
             raise OdisarError(
                 "this capability is not calibrated and refuses to answer; run the calibrate stage"
             )
-        windows = reported_windows(recording, scores, stride_steps)
+        windows = reported_windows(scores, stride_steps)
         positions = scores.positions[windows]
         variances = self._scorer.variances(recording, positions)
+        blamed = blame_windows(self._scorer, recording, scores, windows)
+        made = zip(windows, variances, blamed, strict=True)
         return [
-            self._assessment(recording, i, scores, window, float(variance), step_s)
-            for i, (window, variance) in enumerate(zip(windows, variances, strict=True))
+            self._assessment(
+                self._thresholds,
+                _Window(recording, scores, int(window), index, float(variance), states),
+                step_s,
+            )
+            for index, (window, variance, states) in enumerate(made)
         ]
 
-    def _assessment(
-        self,
-        recording: Recording,
-        index: int,
-        scores: RecordingScores,
-        window: int,
-        variance: float,
-        step_s: float,
-    ) -> Assessment:
-        thresholds = self._thresholds
-        assert thresholds is not None  # noqa: S101 (assess has checked)
-        spec = self._scorer.twin.spec
-        position = int(scores.positions[window])
-        issued_s = float(recording.time_s[position])
-        error = float(scores.scores[ODISAR][window])
-        is_ood, is_uncertain = error > thresholds.reconstruction, variance > thresholds.variance
-        blamed = top_states(scores.state_errors[window], self._scorer.twin.output_names, self._top)
+    def _assessment(self, limits: Thresholds, window: "_Window", step_s: float) -> Assessment:
+        twin, scores, at = self._scorer.twin, window.scores, window.number
+        position = int(scores.positions[at])
+        issued_s = float(window.recording.time_s[position])
+        score = float(scores.scores[ODISAR][at])
+        error = float(scores.scores[RECONSTRUCTION][at])
+        is_ood, is_uncertain = score > limits.score, window.variance > limits.variance
+        blamed = top_states(window.blamed, blamed_names(twin), self._top)
+        rebuilt = top_states(scores.state_errors[at], twin.output_names, self._top)
         return Assessment(
-            recording=recording.name,
-            sequence_index=index,
+            recording=window.recording.name,
+            sequence_index=window.index,
             start_time_step=position + 1,
-            end_time_step=position + spec.horizon_steps,
+            end_time_step=position + twin.spec.horizon_steps,
             issued_s=issued_s,
             start_s=issued_s + step_s,
-            end_s=issued_s + spec.horizon_steps * step_s,
+            end_s=issued_s + twin.spec.horizon_steps * step_s,
             is_OOD=is_ood,
+            score=score,
+            score_exceeds_threshold=is_ood,
             reconstruction_error=error,
-            uncertainty_variance=variance,
-            recon_exceeds_threshold=is_ood,
+            uncertainty_variance=window.variance,
+            recon_exceeds_threshold=error > limits.reconstruction,
             uncertainty_exceeds_threshold=is_uncertain,
             category=quadrant(is_ood=is_ood, is_uncertain=is_uncertain).value,
             state_attribution=blamed if is_ood else {},
+            reconstruction_attribution=rebuilt if error > limits.reconstruction else {},
         )
 
 
-def reported_windows(
-    recording: Recording, scores: RecordingScores, stride_steps: int
-) -> NDArray[np.int64]:
-    """Return which scored windows are reported: every ``stride_steps``-th of each segment."""
+@dataclass(frozen=True)
+class _Window:
+    """A window that is being assessed: its place among the scored and among the reported ones."""
+
+    recording: Recording
+    scores: RecordingScores
+    number: int
+    index: int
+    variance: float
+    blamed: FloatArray
+
+
+def reported_windows(scores: RecordingScores, stride_steps: int) -> NDArray[np.int64]:
+    """Return which scored windows are reported: every ``stride_steps``-th of each gapless run.
+
+    The first is the first whose score is known: some forecasts must have met their samples.
+    """
+    known = np.isfinite(scores.scores[ODISAR])
     first = [
-        np.flatnonzero((scores.positions >= start) & (scores.positions < stop))[::stride_steps]
-        for start, stop in recording.segments
+        start + np.flatnonzero(np.logical_or.accumulate(known[start:stop]))[::stride_steps]
+        for start, stop in scores.runs
     ]
     return np.concatenate([np.empty(0, dtype=np.int64), *first])
+
+
+def blame_windows(
+    scorer: Scorer, recording: Recording, scores: RecordingScores, windows: NDArray[np.int64]
+) -> FloatArray:
+    """Return (window, state) how much each state explains of the score of these windows.
+
+    States are those of ``blamed_names``; see ``Signatures.blame``.
+    """
+    assert scorer.innovation_scores is not None  # noqa: S101 (who asks has checked)
+    signatures = Signatures.of(scorer.twin, scorer.innovation_scores.twin)
+    parts = [np.empty((0, len(blamed_names(scorer.twin))))]
+    for start, stop in scores.runs:
+        own = windows[(windows >= start) & (windows < stop)]
+        directions = state_directions(scorer.twin, recording, scores.positions[own])
+        innovations = scores.innovations[start:stop]
+        parts.append(signatures.blame(innovations, own - start, directions))
+    return np.concatenate(parts)
 
 
 @cache

@@ -9,6 +9,6 @@ from numpy.typing import NDArray
 def top_states(
     state_errors: NDArray[np.floating], names: Sequence[str], top: int
 ) -> dict[str, float]:
-    """Return the ``top`` states with the largest reconstruction error (state,), largest first."""
+    """Return the ``top`` states with the largest share (state,) in a score, largest first."""
     order = np.argsort(-state_errors, kind="stable")[:top]
     return {names[i]: float(state_errors[i]) for i in order}

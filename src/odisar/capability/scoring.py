@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from odisar.baselines.forecast_error import delayed, forecast_rmse
+from odisar.capability.innovations import FloatArray, InnovationScore
 from odisar.capability.scores import (
     predictive_variance,
     reconstruction_error,
@@ -20,9 +22,31 @@ from odisar.twin.transformer import TwinOutput
 from odisar.windows.targets import horizon_targets
 from odisar.windows.window_set import model_inputs, scaled_features
 
-#: Names of the deployable detectors whose scores a recording gets.
-ODISAR, RMSE, RMSE_SHORT = "odisar", "rmse", "rmse-short-lead"
-DETECTORS = (ODISAR, RMSE, RMSE_SHORT)
+#: The monitor's score: innovations of the twin. The same of its closed form alone. The paper's.
+ODISAR, CLOSED_FORM, RECONSTRUCTION = "odisar", "closed-form", "reconstruction"
+#: The forecast-error baselines.
+RMSE, RMSE_SHORT = "rmse", "rmse-short-lead"
+DETECTORS = (ODISAR, CLOSED_FORM, RECONSTRUCTION, RMSE, RMSE_SHORT)
+
+
+@dataclass(frozen=True)
+class InnovationScores:
+    """Fitted scores: the monitor's, and that of the closed form's innovations alone."""
+
+    twin: InnovationScore
+    closed_form: InnovationScore
+
+    def of(
+        self, innovations: FloatArray, closed_form: FloatArray, reconstruction: FloatArray
+    ) -> dict[str, NDArray[np.float32]]:
+        """Return (window,) scores by detector along one gapless run.
+
+        Innovations are (window, state feature), ``reconstruction`` errors (window,).
+        """
+        return {
+            ODISAR: self.twin.score(innovations, reconstruction).astype(np.float32),
+            CLOSED_FORM: self.closed_form.score(closed_form, reconstruction).astype(np.float32),
+        }
 
 
 @dataclass(frozen=True)
@@ -30,19 +54,35 @@ class RecordingScores:
     """Scores of a recording at its issue positions.
 
     ``positions`` (window,) are sample positions t; ``scores`` maps a detector to (window,) what it
-    says at t, NaN while it cannot say anything yet; ``state_errors`` (window, state), scaled.
+    says at t, NaN while it cannot say anything yet; ``state_errors`` (window, state) are those of
+    the reconstruction, ``innovations`` and ``closed_form_innovations`` (window, state feature) are
+    NaN where there was no forecast of t yet; all scaled. ``runs`` are half-open ranges of windows
+    without a gap.
     """
 
     positions: NDArray[np.int64]
     scores: Mapping[str, NDArray[np.float32]]
     state_errors: NDArray[np.float32]
+    innovations: NDArray[np.float64]
+    closed_form_innovations: NDArray[np.float64]
+    runs: tuple[tuple[int, int], ...]
 
 
 class Scorer:
-    """A trained twin on a device, asked for forecasts in batches."""
+    """A trained twin on a device, asked for forecasts in batches.
 
-    def __init__(self, twin: TrainedTwin, batch: int, device: str) -> None:
+    Without fitted ``innovation_scores`` the scores that need them are left out.
+    """
+
+    def __init__(
+        self,
+        twin: TrainedTwin,
+        batch: int,
+        device: str,
+        innovation_scores: InnovationScores | None = None,
+    ) -> None:
         self.twin = twin
+        self.innovation_scores = innovation_scores
         self._batch = batch
         self._device = torch.device(device)
         self._network = twin.network.to(self._device).eval()
@@ -60,40 +100,40 @@ class Scorer:
         needed_after = horizon if self.twin.spec.known_ahead else 0
         for segment in recording.segments:
             positions = self.twin.spec.issue_positions(segment, 1, horizon_steps=needed_after)
-            if positions.size == 0:
-                continue
-            observed = recording.values[: segment[1]]
-            state_errors, full, short = self._score_segment(
-                samples, observed, positions, short_lead_steps
-            )
-            scores = {
-                ODISAR: reconstruction_error(state_errors),
-                RMSE: delayed(full, horizon),
-                RMSE_SHORT: delayed(short, short_lead_steps),
-            }
-            parts.append(RecordingScores(positions, scores, state_errors))
-        return _joined(parts, len(self.twin.spec.outputs))
+            if positions.size:
+                observed = recording.values[: segment[1]]
+                parts.append(self._score_segment(samples, observed, positions, short_lead_steps))
+        return _joined(parts, len(self.twin.spec.outputs), len(self._network.state_features))
+
+    def draws(self, recording: Recording, positions: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return (draw, window, step, state) the dropout draws of forecasts, scaled."""
+        samples = self._samples(recording)
+        spec = self.twin.spec
+        draws = len(next(iter(self.twin.masks.values())))
+        parts = [np.empty((draws, 0, spec.horizon_steps, len(spec.outputs)), dtype=np.float32)]
+        parts += [
+            draw_forecasts(self._network, self.twin.masks, *self._inputs(samples, chunk))
+            .forecast.cpu()
+            .numpy()
+            for chunk in _chunks(positions, max(1, self._batch // 8))
+        ]
+        return np.concatenate(parts, axis=1)
 
     def variances(self, recording: Recording, positions: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return (window,) Monte Carlo variance of the forecasts issued at ``positions``."""
-        samples = self._samples(recording)
-        variances = [
-            predictive_variance(
-                draw_forecasts(self._network, self.twin.masks, *self._inputs(samples, chunk))
-                .forecast.cpu()
-                .numpy()
-            )
-            for chunk in _chunks(positions, max(1, self._batch // 8))
-        ]
-        return np.concatenate([np.empty(0, dtype=np.float32), *variances])
+        return predictive_variance(self.draws(recording, positions))
 
     def forecast(self, recording: Recording, positions: NDArray[np.int64]) -> TwinOutput:
         """Return forecasts and reconstructions (window, step, state), scaled, on the CPU."""
         samples = self._samples(recording)
-        outputs = [self._forecast(samples, chunk) for chunk in _chunks(positions, self._batch)]
+        outputs = [
+            self._forecast(*self._inputs(samples, chunk))
+            for chunk in _chunks(positions, self._batch)
+        ]
         return TwinOutput(
             torch.cat([output.forecast for output in outputs]),
             torch.cat([output.reconstruction for output in outputs]),
+            torch.cat([output.next_sample for output in outputs]),
         )
 
     def _score_segment(
@@ -102,11 +142,12 @@ class Scorer:
         observed: NDArray[np.float64],
         positions: NDArray[np.int64],
         short_lead: int,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    ) -> RecordingScores:
         spec = self.twin.spec
-        state_errors, full, short = [], [], []
+        state_errors, full, short, following, closed = [], [], [], [], []
         for chunk in _chunks(positions, self._batch):
-            output = self._forecast(samples, chunk)
+            context, known = self._inputs(samples, chunk)
+            output = self._forecast(context, known)
             forecast = output.forecast.numpy()
             state_errors.append(
                 state_reconstruction_errors(forecast, output.reconstruction.numpy())
@@ -114,12 +155,35 @@ class Scorer:
             truth = self.twin.scaler.scale_targets(horizon_targets(observed, chunk, spec))
             full.append(forecast_rmse(forecast, truth, spec.horizon_steps))
             short.append(forecast_rmse(forecast, truth, short_lead))
-        return np.concatenate(state_errors), np.concatenate(full), np.concatenate(short)
+            following.append(output.next_sample.numpy())
+            closed.append(self._closed_form(context))
+        scaled = samples[positions][:, list(self._network.state_features)].numpy()
+        errors = np.concatenate(state_errors)
+        rebuilt = reconstruction_error(errors)
+        scores = {
+            RECONSTRUCTION: rebuilt,
+            RMSE: delayed(np.concatenate(full), spec.horizon_steps),
+            RMSE_SHORT: delayed(np.concatenate(short), short_lead),
+        }
+        innovations = _innovations(scaled, np.concatenate(following))
+        closed_form = _innovations(scaled, np.concatenate(closed))
+        if self.innovation_scores is not None:
+            fitted = self.innovation_scores
+            scores = fitted.of(innovations, closed_form, rebuilt.astype(np.float64)) | scores
+        run = ((0, len(positions)),)
+        return RecordingScores(positions, scores, errors, innovations, closed_form, run)
 
     @torch.inference_mode()
-    def _forecast(self, samples: torch.Tensor, positions: NDArray[np.int64]) -> TwinOutput:
-        output: TwinOutput = self._network(*self._inputs(samples, positions))
-        return TwinOutput(output.forecast.cpu(), output.reconstruction.cpu())
+    def _closed_form(self, context: torch.Tensor) -> NDArray[np.float32]:
+        forecast: torch.Tensor = self._network.next_closed_form(context)
+        return forecast.cpu().numpy()
+
+    @torch.inference_mode()
+    def _forecast(self, context: torch.Tensor, known: torch.Tensor) -> TwinOutput:
+        output: TwinOutput = self._network(context, known)
+        return TwinOutput(
+            output.forecast.cpu(), output.reconstruction.cpu(), output.next_sample.cpu()
+        )
 
     def _inputs(
         self, samples: torch.Tensor, positions: NDArray[np.int64]
@@ -136,16 +200,31 @@ def _chunks(positions: NDArray[np.int64], size: int) -> list[NDArray[np.int64]]:
     return [positions[i : i + size] for i in range(0, len(positions), size)]
 
 
-def _joined(parts: list[RecordingScores], states: int) -> RecordingScores:
+def _innovations(scaled: NDArray[np.float32], following: NDArray[np.float32]) -> FloatArray:
+    """Return (window, state feature) observed minus what was forecast one step before."""
+    innovations = np.full(scaled.shape, np.nan)
+    innovations[1:] = scaled[1:].astype(np.float64) - following[:-1]
+    return innovations
+
+
+def _joined(parts: list[RecordingScores], states: int, features: int) -> RecordingScores:
     if not parts:
-        empty = np.empty(0, dtype=np.float32)
+        empty, none = np.empty(0, dtype=np.float32), np.empty((0, features))
         return RecordingScores(
             np.empty(0, dtype=np.int64),
             dict.fromkeys(DETECTORS, empty),
             np.empty((0, states), dtype=np.float32),
+            none,
+            none,
+            (),
         )
+    lengths = [len(part.positions) for part in parts]
+    borders = np.cumsum([0, *lengths]).tolist()
     return RecordingScores(
         np.concatenate([part.positions for part in parts]),
         {name: np.concatenate([part.scores[name] for part in parts]) for name in parts[0].scores},
         np.concatenate([part.state_errors for part in parts]),
+        np.concatenate([part.innovations for part in parts]),
+        np.concatenate([part.closed_form_innovations for part in parts]),
+        tuple(pairwise(borders)),
     )

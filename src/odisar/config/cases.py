@@ -5,16 +5,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import Section
+from odisar.config.base import Fraction, PositiveFloat, PositiveInt, Section
+from odisar.config.faults import Faults
 from odisar.config.formats import BagFormat, CsvFormat
-
-PositiveInt = Annotated[int, Field(gt=0)]
-PositiveFloat = Annotated[float, Field(gt=0)]
-Fraction = Annotated[float, Field(gt=0, lt=1)]
 
 #: What can make a case's recordings where they are missing.
 Maker = Literal["ferry-simulator", "gunnerus-trial", "robot-simulator", "omni3-runs", "none"]
-FaultKind = Literal["noise", "bias", "drift", "stuck", "delay"]
 
 
 class Channel(Section):
@@ -124,48 +120,6 @@ class Splits(Section):
         return self
 
 
-class Span(Section):
-    """A length in seconds drawn evenly between two, both included."""
-
-    low: PositiveFloat
-    high: PositiveFloat
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.low > self.high:
-            raise ValueError(f"low={self.low} is above high={self.high}; swap them")
-        return self
-
-
-class Faults(Section):
-    """Sensor faults to inject into copies of held-out recordings (see ``recordings.faults``).
-
-    ``sizes`` lists, by kind, the sizes of noise (its standard deviation), bias and drift (at the
-    end of the interval), in standard deviations of the channel over the training recordings
-    (``sizes_in: sd``) or in the channel's unit; ``delays_s`` are for delay.
-    A stuck or delayed sensor differs from a sound one only while its channel moves: a copy that
-    never differs by ``shows_from_sd`` standard deviations is marked ``hidden`` in the metadata
-    column ``fault_shows``, any other ``shows``.
-    """
-
-    kinds: list[FaultKind]
-    channels: list[str]
-    sizes: dict[FaultKind, list[PositiveFloat]]
-    sizes_in: Literal["sd", "unit"]
-    delays_s: list[PositiveFloat]
-    start_s: PositiveFloat
-    duration_s: Span
-    shows_from_sd: PositiveFloat
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for kind in self.kinds:
-            sizes = self.delays_s if kind == "delay" else self.sizes.get(kind)
-            if kind != "stuck" and not sizes:
-                raise ValueError(f"faults: {kind} is among kinds but has no size; add one")
-        return self
-
-
 class RangeRule(Section):
     """A one-line check a user would try first: flag where a channel's mean leaves a range."""
 
@@ -230,7 +184,7 @@ class Case(Section):
             raise ValueError("channels: at least one state needs output: true")
         self._check_times()
         mentioned = [rule.channel for rule in self.range_rules]
-        mentioned += self.faults.channels if self.faults else []
+        mentioned += self.faults.all_channels if self.faults else []
         mentioned += self.pose.channels if self.pose else []
         mentioned += list(self.source.bag.fields) if self.source.bag else []
         for name in mentioned:
@@ -307,6 +261,21 @@ class Case(Section):
     def output_indices(self) -> list[int]:
         """Positions of the forecast states among the channels."""
         return [i for i, channel in enumerate(self.channels) if channel.output]
+
+    @property
+    def blamed_names(self) -> list[str]:
+        """Names of the states that attribution can blame, z and w of a heading being one."""
+        states = [channel.name for channel in self.channels if channel.role == "state"]
+        if self.pose is None or self.pose.coordinates == "absolute":
+            return states
+        heading = " / ".join(self.pose.heading)
+        others = [name for name in states if name not in self.pose.channels]
+        return [self.pose.x, self.pose.y, heading, *others]
+
+    @property
+    def command_indices(self) -> list[int]:
+        """Positions of the commands among the channels."""
+        return [i for i, channel in enumerate(self.channels) if channel.role == "command"]
 
     @property
     def known_ahead_indices(self) -> list[int]:

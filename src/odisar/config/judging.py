@@ -1,18 +1,29 @@
 """Sections for the capability and for the evaluation."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
-from odisar.config.base import Section
-from odisar.config.cases import Case, PositiveFloat, PositiveInt
+from odisar.config.base import PositiveFloat, PositiveInt, Section
+from odisar.config.cases import Case
 
 _GUARDS = ("guard_start_s", "guard_end_s")
 
 
-class CapabilityConfig(Section):
-    """Thresholds and attribution (paper, section "Creating DTC")."""
+class InnovationConfig(Section):
+    """How many of the last innovations the statistics of the score look at, and their weights."""
 
+    mean_steps: PositiveInt
+    size_steps: PositiveInt
+    recent_steps: PositiveInt
+    recent_share: Annotated[float, Field(ge=0, lt=1)]
+
+
+class CapabilityConfig(Section):
+    """The score, thresholds and attribution (paper, section "Creating DTC")."""
+
+    innovation: InnovationConfig
+    threshold_rule: Literal["sigma", "log-sigma", "operating", "conformal"]
     threshold_sigmas: PositiveFloat
     attribution_top: PositiveInt
     scoring_batch: PositiveInt

@@ -4,8 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import Section
-from odisar.config.cases import PositiveFloat, PositiveInt
+from odisar.config.base import PositiveFloat, PositiveInt, Section
 
 # Far above any sensible twin: what a file that was meddled with may ask for has an end.
 ModelDim = Annotated[int, Field(gt=0, le=4096)]
@@ -16,7 +15,12 @@ DropoutRate = Annotated[float, Field(ge=0, lt=1)]
 
 
 class TwinConfig(Section):
-    """Shape of the Transformer (paper, Table "Model and Training Parameters")."""
+    """Shape of the Transformer (paper, Table "Model and Training Parameters"), and its closed form.
+
+    The next sample is always forecast as what a frozen closed form of the last
+    ``closed_form_lags`` samples says, plus what the Transformer adds; with ``residual_forecast``
+    the horizon as well.
+    """
 
     patch_steps: Steps
     model_dim: ModelDim
@@ -26,6 +30,8 @@ class TwinConfig(Section):
     reconstruction_dim: HiddenDim
     dropout: DropoutRate
     detach_reconstruction: bool
+    closed_form_lags: Steps
+    residual_forecast: bool
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -52,6 +58,7 @@ class TrainingConfig(Section):
     steps_per_epoch: PositiveInt
     patience_epochs: PositiveInt
     gradient_clip: PositiveFloat
+    weigh_loss: bool
     validation_stride_steps: PositiveInt
 
 

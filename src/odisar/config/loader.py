@@ -7,13 +7,14 @@ from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from odisar.config.base import Section
-from odisar.config.cases import Case, Maker, PositiveInt, Setup
+from odisar.config.base import PositiveInt, Section
+from odisar.config.cases import Case, Maker, Setup
 from odisar.config.judging import CapabilityConfig, EvaluationConfig
 from odisar.config.learning import MonteCarloConfig, TrainingConfig, TuningConfig, TwinConfig
 from odisar.config.registry import RegistryConfig
 from odisar.config.simulators import Simulator, SimulatorsConfig
 from odisar.config.sources import SourcesConfig
+from odisar.config.study import StudyConfig
 from odisar.errors import OdisarError
 
 PARAMS_FILE = "params.yaml"
@@ -61,6 +62,7 @@ class Config(Section):
     tracking: TrackingConfig
     registry: RegistryConfig
     report: ReportConfig
+    study: StudyConfig
     simulators: SimulatorsConfig
     sources: SourcesConfig
     profiles: dict[str, dict[str, Any]]
@@ -73,6 +75,12 @@ class Config(Section):
             if name not in self.setups:
                 raise ValueError(
                     f"pipeline.setups: {name!r} is not declared under setups; declared are: "
+                    f"{', '.join(self.setups)}"
+                )
+        for name in self.study.setups:
+            if name not in self.setups:
+                raise ValueError(
+                    f"study.setups: {name!r} is not declared under setups; declared are: "
                     f"{', '.join(self.setups)}"
                 )
         for name, setup in self.setups.items():

@@ -4,8 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from odisar.config.base import Section
-from odisar.config.cases import PositiveInt
+from odisar.config.base import PositiveInt, Section
 
 
 class ChampionRule(Section):

@@ -4,8 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import Section
-from odisar.config.cases import Fraction, PositiveFloat, PositiveInt
+from odisar.config.base import Fraction, PositiveFloat, PositiveInt, Section
 from odisar.config.ranges import NonNegativeFloat, NonNegativeInt, Range, Share
 
 

@@ -5,8 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import Section
-from odisar.config.cases import PositiveFloat, PositiveInt
+from odisar.config.base import PositiveFloat, PositiveInt, Section
 
 
 class Pinned(Section):

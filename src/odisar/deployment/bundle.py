@@ -74,6 +74,7 @@ def read_bundle(folder: Path) -> Deployed:
         )
     twin = _read_twin(folder)
     _check_fit(folder, twin, case)
+    _check_innovation(folder, twin, settings)
     deployed = Deployed(twin, case, settings, manifest, example)
     _check_example(folder, deployed)
     return deployed
@@ -107,6 +108,7 @@ def _check_fit(folder: Path, twin: TrainedTwin, case: Case) -> None:
     for what, of_twin, of_case in (
         ("channels", list(twin.channel_names), case.channel_names),
         ("outputs", list(twin.spec.outputs), case.output_indices),
+        ("commands", list(twin.spec.commands), case.command_indices),
         ("pose", twin.spec.pose, pose_channels(case)),
         ("known_ahead", list(twin.spec.known_ahead), case.known_ahead_indices),
         ("context_steps", twin.spec.context_steps, case.window.context_steps),
@@ -119,6 +121,17 @@ def _check_fit(folder: Path, twin: TrainedTwin, case: Case) -> None:
             )
     if not all(bool(torch.isfinite(part).all()) for part in twin.network.state_dict().values()):
         raise OdisarError(f"{folder}: weights.safetensors holds NaN or infinity; train it again")
+
+
+def _check_innovation(folder: Path, twin: TrainedTwin, settings: CapabilitySettings) -> None:
+    """Raise where the fitted score is not of this twin's states."""
+    states = len(twin.network.state_features)
+    if settings.innovation.states != {states}:
+        raise OdisarError(
+            f"{folder / CAPABILITY_FILE}: innovation has covariances of "
+            f"{sorted(settings.innovation.states)} states, the twin {states}; write the bundle "
+            "again from one run of the pipeline"
+        )
 
 
 def _check_example(folder: Path, deployed: Deployed) -> None:

@@ -15,9 +15,10 @@ from odisar.capability.assessment import (
     assessment_schema,
     assessments_json,
 )
+from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.scoring import Scorer
-from odisar.config.base import Section
-from odisar.config.cases import Case, PositiveFloat, PositiveInt
+from odisar.config.base import PositiveFloat, PositiveInt, Section
+from odisar.config.cases import Case
 from odisar.deployment.manifest import Manifest
 from odisar.deployment.samples import recordings_from_table
 from odisar.recordings.schema import Recording
@@ -30,6 +31,7 @@ ASSESSMENT_COLUMNS = tuple(assessment_schema()["required"])
 class ThresholdValues(Section):
     """What calibration recordings allow; see ``capability.assessment.Thresholds``."""
 
+    score: PositiveFloat
     reconstruction: PositiveFloat
     variance: PositiveFloat
 
@@ -37,11 +39,13 @@ class ThresholdValues(Section):
 class CapabilitySettings(Section):
     """How a twin's scores become assessments, and what calibration has set.
 
-    ``thresholds`` decide the assessments. ``sigma`` and ``operating`` hold, by detector, the
-    mu + k sigma threshold and the one that keeps the promised alarm rate. A window is reported
-    every ``report_stride_steps``; ``max_rows`` samples are taken at once.
+    ``innovation`` is the fitted score, ``thresholds`` decide the assessments. ``sigma`` and
+    ``operating`` hold, by detector, the mu + k sigma threshold and the one that keeps the promised
+    alarm rate. A window is reported every ``report_stride_steps``; ``max_rows`` samples are taken
+    at once.
     """
 
+    innovation: InnovationScoreValues
     thresholds: ThresholdValues
     threshold_sigmas: PositiveFloat
     sigma: dict[str, PositiveFloat]
@@ -86,8 +90,8 @@ class Deployed:
     ) -> None:
         self.twin, self.case, self.settings, self.manifest = twin, case, settings, manifest
         self._example = example
-        self._scorer = Scorer(twin, settings.scoring_batch, "cpu")
-        thresholds = Thresholds(settings.thresholds.reconstruction, settings.thresholds.variance)
+        self._scorer = Scorer(twin, settings.scoring_batch, "cpu", settings.innovation.build())
+        thresholds = Thresholds(**settings.thresholds.model_dump())
         self._capability = Capability(
             self._scorer, thresholds, attribution_top=settings.attribution_top
         )

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from odisar.capability.scores import reconstruction_error, state_reconstruction_errors
-from odisar.capability.scoring import Scorer
+from odisar.capability.scoring import ODISAR, Scorer
 from odisar.config.cases import Case
 from odisar.config.judging import EvaluationConfig
 from odisar.evaluation.cells import OVERALL, describe, disturbed_cells
@@ -21,7 +20,7 @@ from odisar.seeding import generator
 
 @dataclass(frozen=True)
 class DevelopmentScore:
-    """AUROC of the reconstruction error under protocol P2, all strengths pooled.
+    """AUROC of the monitor's score under protocol P2, all strengths pooled.
 
     ``auroc`` is None where the development recordings hold no disturbed or no undisturbed sample,
     the interval (over recordings that vary together) also where there is only one cluster.
@@ -61,7 +60,10 @@ def measure(
     """
     judged = judged_recordings(recordings, case)
     positions = [_positions(scorer, item, stride_steps) for item in judged]
-    parts = [_score(scorer, *pair) for pair in zip(judged, positions, strict=True)]
+    parts = [
+        _score(scorer, item, at, case.short_lead_steps)
+        for item, at in zip(judged, positions, strict=True)
+    ]
     scores = np.concatenate([np.empty(0), *(part[0] for part in parts)])
     labels = np.concatenate([np.empty(0, dtype=bool), *(part[1] for part in parts)])
     auroc = float(auroc_of_counts(*count_levels(scores, labels)))
@@ -94,26 +96,24 @@ def _positions(scorer: Scorer, recording: Recording, stride_steps: int) -> NDArr
     """Return (window,) every ``stride_steps``-th judged position."""
     spec = scorer.twin.spec
     ahead = spec.horizon_steps if spec.known_ahead else 0
+    assert scorer.innovation_scores is not None  # noqa: S101 (who asks has calibrated)
+    first = max(spec.horizon_steps, scorer.innovation_scores.twin.known_after_steps)
     return np.concatenate(
         [
-            spec.issue_positions(segment, 1, horizon_steps=ahead)[
-                spec.horizon_steps :: stride_steps
-            ]
+            spec.issue_positions(segment, 1, horizon_steps=ahead)[first::stride_steps]
             for segment in recording.segments
         ]
     )
 
 
 def _score(
-    scorer: Scorer, recording: Recording, positions: NDArray[np.int64]
+    scorer: Scorer, recording: Recording, positions: NDArray[np.int64], short_lead_steps: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return (window,) scores and labels at the positions."""
-    if positions.size == 0:
-        return np.empty(0), np.empty(0, dtype=bool)
-    output = scorer.forecast(recording, positions)
-    errors = state_reconstruction_errors(output.forecast.numpy(), output.reconstruction.numpy())
+    scored = scorer.score(recording, short_lead_steps=short_lead_steps)
+    chosen = np.isin(scored.positions, positions, assume_unique=True)
     labels = label_active(recording.time_s[positions], recording.intervals)
-    return reconstruction_error(errors).astype(np.float64), labels
+    return scored.scores[ODISAR][chosen].astype(np.float64), labels
 
 
 def _hash(

@@ -6,7 +6,8 @@ overlap. Both are evaluated on the same bootstrap draws over clusters of recordi
 draw by draw (the paired bootstrap; Efron and Tibshirani 1993, chapter 8).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -51,13 +52,22 @@ Judged = Mapping[str, Resampled]
 CellDraws = Sequence[tuple[Cell, Resampler]]
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """Which detector is compared with all others, by which protocols, on which cells (or all)."""
+
+    reference: str
+    protocols: Sequence[str] = PROTOCOLS
+    cells: Collection[str] | None = None
+
+
 def paired_table(
     scored: Mapping[str, Sequence[ScoredRecording]],
     case_groups: Groups,
     cfg: Judging,
     persistence_s: float,
     base_seed: int,
-    reference: str = "odisar",
+    comparison: Comparison,
 ) -> pd.DataFrame:
     """Return what the reference detector has over every other one, with paired intervals.
 
@@ -67,8 +77,8 @@ def paired_table(
         By set-up, the scored recordings; their order has no influence.
     case_groups, cfg, persistence_s, base_seed
         As for the detection table; the same base seed takes the same draws.
-    reference
-        The detector that the others are subtracted from.
+    comparison
+        Which detector the others are subtracted from, and where.
 
     Returns
     -------
@@ -87,7 +97,7 @@ def paired_table(
     for setup, given in scored.items():
         recordings = sorted(given, key=lambda item: item.name)
         check_detectors(setup, recordings)
-        _check_reference(setup, recordings[0], reference)
+        _check_reference(setup, recordings[0], comparison.reference)
         descriptions = [describe(item.info, case_groups) for item in recordings]
         draws = [
             (
@@ -95,10 +105,11 @@ def paired_table(
                 cell_resampler(cell, [recordings[i].cluster for i in cell.members], cfg, base_seed),
             )
             for cell in disturbed_cells(descriptions, case_groups)
+            if comparison.cells is None or cell.evaluated_on in comparison.cells
         ]
-        found = _detection_rows(recordings, draws, cfg, reference)
-        found += _delay_rows(recordings, draws, persistence_s, reference)
-        rows += [{"setup": setup, "detector": reference, **row} for row in found]
+        found = _detection_rows(recordings, draws, cfg, comparison)
+        found += _delay_rows(recordings, draws, persistence_s, comparison.reference)
+        rows += [{"setup": setup, "detector": comparison.reference, **row} for row in found]
     return pd.DataFrame(rows, columns=list(PAIRED_COLUMNS))
 
 
@@ -111,11 +122,12 @@ def _check_reference(setup: str, first: ScoredRecording, reference: str) -> None
 
 
 def _detection_rows(
-    recordings: Sequence[ScoredRecording], draws: CellDraws, cfg: Judging, reference: str
+    recordings: Sequence[ScoredRecording], draws: CellDraws, cfg: Judging, comparison: Comparison
 ) -> list[Row]:
     rows: list[Row] = []
+    reference = comparison.reference
     used = sorted({int(i) for cell, _ in draws for i in cell.members})
-    for protocol in PROTOCOLS:
+    for protocol in comparison.protocols:
         samples = {i: take_samples(recordings[i], protocol, cfg) for i in used}
         parts = {
             detector: contributions(samples, detector, cfg.bootstrap_bins)

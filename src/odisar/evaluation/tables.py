@@ -1,6 +1,6 @@
 """Tables: every detector under every protocol on every group of recordings, with intervals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 
 import pandas as pd
@@ -10,7 +10,7 @@ from odisar.config.judging import Judging
 from odisar.errors import OdisarError
 from odisar.evaluation.cells import Cell, cell_resampler, describe, disturbed_cells
 from odisar.evaluation.intervals import Resampler
-from odisar.evaluation.operating import operating_rows, operating_table
+from odisar.evaluation.operating import OPERATING_PROTOCOL, operating_rows, operating_table
 from odisar.evaluation.protocols import PROTOCOLS, take_samples
 from odisar.evaluation.published import (
     PUBLISHED_PROTOCOLS,
@@ -52,6 +52,7 @@ def detection_table(
     persistence_s: float,
     base_seed: int,
     published_as: Mapping[str, str | None],
+    monitor_only: Collection[str] = (),
 ) -> pd.DataFrame:
     """Return the tidy table of detection and operating metrics of one case.
 
@@ -69,6 +70,8 @@ def detection_table(
         The seed from which the bootstrap's are derived.
     published_as
         By set-up, the name under which the paper published it, or None.
+    monitor_only
+        Detectors that are judged by the monitor's protocol (P2) alone.
 
     Returns
     -------
@@ -86,7 +89,7 @@ def detection_table(
             cell_resampler(cell, [recordings[i].cluster for i in cell.members], cfg, base_seed)
             for cell in cells
         ]
-        found = _detection_rows(recordings, cells, resamplers, cfg)
+        found = _detection_rows(recordings, cells, resamplers, cfg, monitor_only)
         found += operating_rows(recordings, case_groups, cfg, persistence_s, base_seed)
         rows += [{"setup": setup, **row} for row in found]
     table = pd.DataFrame(rows, columns=list(DETECTION_COLUMNS))
@@ -129,6 +132,7 @@ def _detection_rows(
     cells: Sequence[Cell],
     resamplers: Sequence[Resampler],
     cfg: Judging,
+    monitor_only: Collection[str],
 ) -> list[Row]:
     """Return the rows of one set-up; what a recording contributes is computed once."""
     rows: list[Row] = []
@@ -136,6 +140,8 @@ def _detection_rows(
     for protocol in PROTOCOLS:
         samples = {i: take_samples(recordings[i], protocol, cfg) for i in sorted(used)}
         for detector in (*recordings[0].detectors, ORACLE):
+            if protocol != OPERATING_PROTOCOL and detector in monitor_only:
+                continue
             parts = contributions(samples, detector, cfg.bootstrap_bins)
             for cell, resampler in zip(cells, resamplers, strict=True):
                 measured = measure_detection([parts[i] for i in cell.members], resampler)

@@ -248,6 +248,7 @@ def _faults(draft: Draft) -> Iterator[str]:
     yield line(10, f"channels: [{', '.join(scalar(name) for name in draft.faulty[:count])}]")
     yield line(10, f"sizes: {flow(**drawn)}", note="standard deviations of the channel")
     yield line(10, "sizes_in: sd")
+    yield line(10, "creep: null")
     yield line(10, f"delays_s: [{', '.join(map(scalar, delays))}]")
     yield line(10, f"start_s: {scalar(seconds(plan.fault_start, rate_hz))}")
     yield line(10, f"duration_s: {flow(low=length, high=length)}")

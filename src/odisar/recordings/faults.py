@@ -1,6 +1,7 @@
 """Sensor faults injected into copies of clean held-out recordings.
 
-The kinds follow the usual taxonomy of sensor faults: noise, bias, drift, stuck and delayed values.
+The kinds follow the usual taxonomy of sensor faults: noise, bias, drift, stuck and delayed values,
+and creep, a drift at a stated rate.
 Sizes are multiples of the channel's standard deviation, or in its unit.
 """
 
@@ -11,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from odisar.config.cases import Case, Faults
+from odisar.config.cases import Case
+from odisar.config.faults import FaultKind, Faults
 from odisar.errors import OdisarError
 from odisar.recordings.schema import Interval, Recording, label_times
 from odisar.seeding import generator
@@ -22,7 +24,10 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True)
 class _Fault:
-    """One fault: ``amount`` is a size (``Faults.sizes_in``), seconds (delay) or None (stuck)."""
+    """One fault.
+
+    ``amount`` is a size (``Faults.sizes_in``), seconds (delay), a rate (creep) or None (stuck).
+    """
 
     kind: str
     channel: str
@@ -36,7 +41,7 @@ class _Fault:
 
 
 #: Metadata columns that a faulty copy has besides those of its original.
-FAULT_COLUMNS = ("fault_channel", "fault_size", "fault_shows")
+FAULT_COLUMNS = ("fault", "fault_on", "fault_channel", "fault_size", "fault_shows")
 
 
 def inject_faults(
@@ -82,14 +87,19 @@ def inject_faults(
 
 def _faults(faults: Faults) -> Iterator[_Fault]:
     for kind in faults.kinds:
-        amounts: list[float | None] = [None]
-        if kind == "delay":
-            amounts = [*faults.delays_s]
-        elif kind != "stuck":
-            amounts = [*faults.sizes[kind]]
         for channel in faults.channels:
-            for amount in amounts:
+            for amount in _amounts(faults, kind):
                 yield _Fault(kind, channel, amount)
+    if faults.creep is not None:
+        for channel in faults.creep.channels:
+            for rate in faults.creep.rates:
+                yield _Fault("creep", channel, rate)
+
+
+def _amounts(faults: Faults, kind: FaultKind) -> Sequence[float | None]:
+    if kind == "stuck":
+        return [None]
+    return faults.delays_s if kind == "delay" else faults.sizes[kind]
 
 
 def _check_slugs(faults: Sequence[_Fault]) -> None:
@@ -191,15 +201,19 @@ def _duration_s(faults: Faults, random: np.random.Generator) -> float:
 def _size_unit(fault: _Fault, faults: Faults, case: Case) -> str:
     if fault.kind == "delay":
         return "s"
-    if faults.sizes_in == "sd":
-        return "sd"
-    return case.channels[case.channel_names.index(fault.channel)].unit
+    unit = case.channels[case.channel_names.index(fault.channel)].unit
+    if fault.kind == "creep":
+        return f"{unit}/s"
+    return "sd" if faults.sizes_in == "sd" else unit
 
 
 def _extra(extra: Mapping[str, str], fault: _Fault, unit: str, *, shows: bool) -> dict[str, str]:
     size = "" if fault.amount is None else f"{fault.amount:g} {unit}"
+    described = f"{fault.kind} {size}".strip()
     return {
         **extra,
+        "fault": described,
+        "fault_on": f"{described}, {fault.channel}",
         "fault_channel": fault.channel,
         "fault_size": size,
         "fault_shows": "shows" if shows else "hidden",
@@ -221,6 +235,9 @@ def _faulty_values(
     truth = recording.values[:, column]
     time_s = recording.time_s
     size = 0.0 if fault.amount is None else fault.amount * unit
+    if fault.kind == "creep":
+        grown = (fault.amount or 0.0) * (time_s[inside] - time_s[inside][0])
+        return np.asarray(truth[inside] + grown)
     samples = int(inside.sum())
     if fault.kind == "noise":
         return truth[inside] + random.normal(0.0, size, samples)

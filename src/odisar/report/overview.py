@@ -104,7 +104,7 @@ def training(results: Results) -> Table:
                 f"{available:,}",
                 f"{seen / available:.1f}",
                 str(len(summary["history"])),
-                number(summary["best_validation_forecast_mse"]),
+                number(summary["best_validation_loss"]),
             ]
         )
     heads = [

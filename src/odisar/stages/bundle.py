@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from odisar.artifacts import Workspace, read_json, write_json
-from odisar.capability.scoring import Scorer
+from odisar.capability.innovation_values import InnovationScoreValues
+from odisar.capability.scoring import InnovationScores, Scorer
 from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
 from odisar.deployment.bundle import read_bundle, write_bundle
@@ -66,7 +67,9 @@ def measure_again(
             raise OdisarError(f"its {what} {then}, today's {today[what]}")
     use_one_thread()
     member = setup_members(config, setup)[0]
-    return _measure(config, member, load_member(config, workspace, member), deployed.twin)
+    scores = deployed.settings.innovation.build()
+    data = load_member(config, workspace, member)
+    return _measure(config, member, data, deployed.twin, scores)
 
 
 def _measured_in(case: Case) -> dict[str, str]:
@@ -96,20 +99,26 @@ def _bundle(job: _Job) -> DevelopmentScore:
     )
     settings = _settings(config, limits, twin.spec.horizon_steps)
     data = load_member(config, workspace, member)
-    example = _example(data.splits["calibration"], case_name, case)
+    # A score is known once so many innovations are; relative poses have no increment at first.
+    surplus = settings.innovation.twin.build().known_after_steps + 1
+    example = _example(data.splits["calibration"], case_name, case, surplus)
     folder = workspace.bundle(member.setup)
     write_bundle(folder, twin, case, settings, origin, example)
     deployed = read_bundle(folder)
     deployed.assess(deployed.example)
-    return _measure(config, member, data, twin)
+    return _measure(config, member, data, twin, settings.innovation.build())
 
 
 def _measure(
-    config: ConfigView, member: Member, data: MemberData, twin: TrainedTwin
+    config: ConfigView,
+    member: Member,
+    data: MemberData,
+    twin: TrainedTwin,
+    innovation_scores: InnovationScores,
 ) -> DevelopmentScore:
     device = pick_device(config.pipeline.accelerator)
     return measure(
-        Scorer(twin, config.capability.scoring_batch, device),
+        Scorer(twin, config.capability.scoring_batch, device, innovation_scores),
         data.case,
         data.splits["development"],
         config.evaluation,
@@ -121,6 +130,7 @@ def _measure(
 def _settings(config: ConfigView, limits: dict[str, Any], stride_steps: int) -> CapabilitySettings:
     try:
         return CapabilitySettings(
+            innovation=InnovationScoreValues.model_validate(limits["innovation"]),
             thresholds=ThresholdValues(**limits["thresholds"]),
             threshold_sigmas=config.capability.threshold_sigmas,
             sigma=limits["sigma"],
@@ -139,9 +149,14 @@ def _settings(config: ConfigView, limits: dict[str, Any], stride_steps: int) -> 
         ) from error
 
 
-def _example(recordings: Sequence[Recording], case_name: str, case: Case) -> Example:
-    """Return the first stretch of a calibration recording that is accepted as a table."""
-    for example in _stretches(recordings, case):
+def _example(
+    recordings: Sequence[Recording], case_name: str, case: Case, surplus_steps: int
+) -> Example:
+    """Return the first stretch of a calibration recording that is accepted as a table.
+
+    It has ``surplus_steps`` more samples than a window.
+    """
+    for example in _stretches(recordings, case, surplus_steps):
         try:
             table = example.table
             recordings_from_table(table, case_name, case, len(table))
@@ -154,9 +169,10 @@ def _example(recordings: Sequence[Recording], case_name: str, case: Case) -> Exa
     )
 
 
-def _stretches(recordings: Sequence[Recording], case: Case) -> Iterator[Example]:
-    # One sample more than a window: relative poses have no increment at their first.
-    needed = case.window.context_steps + case.window.horizon_steps + 1
+def _stretches(
+    recordings: Sequence[Recording], case: Case, surplus_steps: int
+) -> Iterator[Example]:
+    needed = case.window.context_steps + case.window.horizon_steps + surplus_steps
     columns = [case.source.time_column, *case.channel_names]
     for item in recordings:
         for begin, end in item.segments:

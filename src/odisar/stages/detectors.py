@@ -1,19 +1,89 @@
-"""All deployable detectors of a case on one recording: the twin's scores and the range rules."""
+"""All deployable detectors of a member: the twin's scores, cheap alternatives, range rules."""
+
+from collections.abc import Mapping
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from odisar.baselines.interface import Detector, Reference
 from odisar.baselines.range_rule import range_rule_scores
-from odisar.capability.scoring import RecordingScores
-from odisar.config.cases import Case
+from odisar.baselines.registry import cheap_detectors, fit_existing
+from odisar.capability.innovations import InnovationScore, InnovationSteps
+from odisar.capability.scoring import (
+    RECONSTRUCTION,
+    InnovationScores,
+    RecordingScores,
+    Scorer,
+)
+from odisar.config.judging import InnovationConfig
 from odisar.recordings.schema import Recording
+from odisar.seeding import derive_seed
+from odisar.stages.members import MemberData
+
+#: Detectors whose threshold is 1 by construction: range rules.
+RULE_THRESHOLD = 1.0
 
 
-def detector_scores(
-    case: Case, recording: Recording, scores: RecordingScores
-) -> dict[str, NDArray[np.float64]]:
-    """Return (window,) scores by detector, at the positions of ``scores``."""
-    by_detector = dict(scores.scores)
-    for rule in case.range_rules:
-        by_detector[rule.name] = range_rule_scores(rule, recording, case, scores.positions)
-    return {name: values.astype(np.float64) for name, values in by_detector.items()}
+class MemberDetectors:
+    """Every detector of one member, ready to score recordings.
+
+    The cheap alternatives are fitted anew by every stage that scores: that takes seconds, gives
+    the same numbers, and nothing of theirs needs a file format.
+    """
+
+    def __init__(
+        self, data: MemberData, scorer: Scorer, alternatives: Mapping[str, Detector]
+    ) -> None:
+        self._data = data
+        self.scorer = scorer
+        self._alternatives = alternatives
+
+    @classmethod
+    def fit(cls, data: MemberData, scorer: Scorer, seed: int) -> Self:
+        """Fit the alternatives on the member's undisturbed recordings."""
+        alternatives = fit_existing(cheap_detectors(data.case), member_reference(data, seed))
+        return cls(data, scorer, alternatives)
+
+    def score(self, recording: Recording) -> tuple[RecordingScores, dict[str, NDArray[np.float64]]]:
+        """Return the twin's scores, and (window,) scores of every detector at their positions."""
+        case = self._data.case
+        scores = self.scorer.score(recording, short_lead_steps=case.short_lead_steps)
+        by_detector = {name: part.astype(np.float64) for name, part in scores.scores.items()}
+        for name, detector in self._alternatives.items():
+            by_detector[name] = detector.score([recording])[0][scores.positions]
+        for rule in case.range_rules:
+            found = range_rule_scores(rule, recording, case, scores.positions)
+            by_detector[rule.name] = found.astype(np.float64)
+        return scores, by_detector
+
+
+def member_reference(data: MemberData, seed: int) -> Reference:
+    """Return what the alternatives of a member may learn from."""
+    return Reference(
+        case=data.case,
+        spec=data.spec,
+        scaler=data.scaler,
+        train=data.splits["train"],
+        held_out=data.splits["validation"],
+        seed=derive_seed(seed, "alternatives"),
+    )
+
+
+def fit_innovation_scores(
+    scorer: Scorer, data: MemberData, config: InnovationConfig
+) -> InnovationScores:
+    """Fit the innovation scores on validation recordings: no weight was fitted to them."""
+    found = [
+        scorer.score(item, short_lead_steps=data.case.short_lead_steps)
+        for item in data.splits["validation"]
+    ]
+    runs = [(scores, slice(a + 1, b)) for scores in found for a, b in scores.runs]
+    rebuilt = [s.scores[RECONSTRUCTION][at].astype(np.float64) for s, at in runs]
+    steps = InnovationSteps(
+        config.mean_steps, config.size_steps, config.recent_steps, config.recent_share
+    )
+    return InnovationScores(
+        InnovationScore.fit([s.innovations[at] for s, at in runs], rebuilt, steps),
+        InnovationScore.fit([s.closed_form_innovations[at] for s, at in runs], None, steps),
+    )

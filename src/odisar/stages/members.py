@@ -76,6 +76,7 @@ def load_member(config: ConfigView, workspace: Workspace, member: Member) -> Mem
         case.window.context_steps,
         case.window.horizon_steps,
         tuple(case.output_indices),
+        tuple(case.command_indices),
         tuple(case.known_ahead_indices),
         pose_channels(case),
     )

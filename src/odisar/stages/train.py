@@ -74,7 +74,7 @@ def _train(job: _Job) -> dict[str, Any]:
     write_twin(workspace.twin(member.name), twin)
     return {
         "history": result.history,
-        "best_validation_forecast_mse": result.best_validation_mse,
+        "best_validation_loss": result.best_validation_loss,
         "windows_seen": result.windows_seen,
         "training_windows": len(train),
         "validation_windows": len(validation),

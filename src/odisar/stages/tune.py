@@ -16,7 +16,7 @@ from odisar.stages.members import Member, MemberData, load_member, pipeline_memb
 from odisar.stages.parallel import run_jobs
 from odisar.tracking import TrackedRun, content_key
 from odisar.twin.devices import use_one_thread
-from odisar.twin.training import TrainingPlan
+from odisar.twin.plan import TrainingPlan
 from odisar.twin.tuning import TuningResult, tune_twin
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "training", "tuning")
@@ -50,7 +50,7 @@ def run(config: ConfigView, workspace: Workspace, tracked: TrackedRun) -> None:
         write_json(workspace.tuned(setup), {"members": content})
         tracked.artifact(workspace.tuned(setup))
         for name, result in studies.items():
-            tracked.metrics({f"{name}.best_validation_forecast_mse": result.best_validation_mse})
+            tracked.metrics({f"{name}.best_validation_loss": result.best_validation_loss})
             _track_trials(tracked, name, result)
     shutil.rmtree(scratch, ignore_errors=True)
 
@@ -59,7 +59,7 @@ def _described(result: TuningResult) -> dict[str, Any]:
     return {
         "configured": result.trials[0],
         "tuned": result.best,
-        "best_validation_forecast_mse": result.best_validation_mse,
+        "best_validation_loss": result.best_validation_loss,
         "trials": result.trials,
     }
 
@@ -85,5 +85,5 @@ def _track_trials(tracked: TrackedRun, member: str, result: TuningResult) -> Non
         name = f"{member} trial {trial['number']}"
         with tracked.child(name, {"member": member, "trial.state": trial["state"]}) as run:
             run.params({k: v for k, v in trial.items() if "." in k})
-            if trial["validation_forecast_mse"] is not None:
-                run.metrics({"validation_forecast_mse": trial["validation_forecast_mse"]})
+            if trial["validation_loss"] is not None:
+                run.metrics({"validation_loss": trial["validation_loss"]})

@@ -70,6 +70,7 @@ class _Spec(Section):
     context_steps: Steps
     horizon_steps: Steps
     outputs: Annotated[list[_Index], Field(min_length=1)]
+    commands: list[_Index]
     known_ahead: list[_Index]
     pose: _Pose | None
 
@@ -78,6 +79,7 @@ class _Spec(Section):
             context_steps=self.context_steps,
             horizon_steps=self.horizon_steps,
             outputs=tuple(self.outputs),
+            commands=tuple(self.commands),
             known_ahead=tuple(self.known_ahead),
             pose=None if self.pose is None else self.pose.as_channels(),
         )
@@ -104,6 +106,7 @@ class _Description(Section):
         pose = () if spec.pose is None else spec.pose.positions
         for what, positions in (
             ("outputs", spec.outputs),
+            ("commands", spec.commands),
             ("known_ahead", spec.known_ahead),
             ("pose", pose),
         ):
@@ -146,12 +149,12 @@ def read_twin(folder: Path) -> TrainedTwin:
     try:
         described = _read_description(folder / _DESCRIPTION)
         config, spec = described.config, described.spec.as_spec()
-        features = spec.feature_count(len(described.channel_names))
+        channels = len(described.channel_names)
         with torch.device("meta"):  # shapes alone, no memory
-            planned = TwinTransformer(config, spec, features)
+            planned = TwinTransformer(config, spec, channels)
         _check_weights(folder / _WEIGHTS, planned, config)
         masks = _read_masks(folder / _MASKS, planned)
-        network = TwinTransformer(config, spec, features)
+        network = TwinTransformer(config, spec, channels)
         network.load_state_dict(load_file(folder / _WEIGHTS))
         scaler = Scaler(**{k: np.array(v) for k, v in described.scaler.model_dump().items()})
     except (OSError, ValueError, RuntimeError, ArithmeticError, SafetensorError) as error:

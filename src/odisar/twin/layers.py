@@ -42,11 +42,16 @@ class Attention(nn.Module):
         self.key_value = nn.Linear(model_dim, 2 * model_dim)
         self.out = nn.Linear(model_dim, model_dim)
 
-    def forward(self, x: torch.Tensor, memory: torch.Tensor) -> torch.Tensor:
-        """Attend from ``x`` (batch, token, feature) to ``memory`` (batch, token, feature)."""
+    def forward(
+        self, x: torch.Tensor, memory: torch.Tensor, *, causal: bool = False
+    ) -> torch.Tensor:
+        """Attend from ``x`` (batch, token, feature) to ``memory`` (batch, token, feature).
+
+        With ``causal`` a token attends to none after its own place.
+        """
         query = self._split(self.query(x))
         key, value = (self._split(part) for part in self.key_value(memory).chunk(2, dim=-1))
-        attended = F.scaled_dot_product_attention(query, key, value)
+        attended = F.scaled_dot_product_attention(query, key, value, is_causal=causal)
         return cast("torch.Tensor", self.out(attended.transpose(1, 2).flatten(2)))
 
     def _split(self, x: torch.Tensor) -> torch.Tensor:
@@ -66,7 +71,7 @@ class FeedForward(nn.Sequential):
 
 
 class EncoderLayer(nn.Module):
-    """Pre-norm self-attention and feed-forward, each with a residual path."""
+    """Pre-norm causal self-attention and feed-forward, each with a residual path."""
 
     def __init__(
         self, model_dim: int, heads: int, hidden_dim: int, rate: float, tokens: int
@@ -82,7 +87,7 @@ class EncoderLayer(nn.Module):
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Return (batch, token, feature)."""
         normed = self.attention_norm(x)
-        x = x + self.attention_dropout(self.attention(normed, normed))
+        x = x + self.attention_dropout(self.attention(normed, normed, causal=True))
         return cast(
             "torch.Tensor", x + self.feedforward_dropout(self.feedforward(self.feedforward_norm(x)))
         )

@@ -61,7 +61,7 @@ def draw_forecasts(
     context: torch.Tensor,
     known_future: torch.Tensor,
 ) -> TwinOutput:
-    """Return forecast and reconstruction (draw, window, horizon step, state) of every draw.
+    """Return what the twin says in every draw: (draw, window, ...), shapes as in ``TwinOutput``.
 
     With masks in the decoder only, the encoder runs once for all draws.
     """
@@ -72,10 +72,13 @@ def draw_forecasts(
         memory = (
             network.encode(repeated) if in_encoder else network.encode(context).repeat(draws, 1, 1)
         )
-        output = network.decode(memory, repeated[:, -1], known_future.repeat(draws, 1, 1))
+        output = network.decode(memory, repeated, known_future.repeat(draws, 1, 1))
+
+    def by_draw(x: torch.Tensor) -> torch.Tensor:
+        return x.reshape(draws, len(context), *x.shape[1:])
+
     return TwinOutput(
-        output.forecast.reshape(draws, len(context), *output.forecast.shape[1:]),
-        output.reconstruction.reshape(draws, len(context), *output.reconstruction.shape[1:]),
+        by_draw(output.forecast), by_draw(output.reconstruction), by_draw(output.next_sample)
     )
 
 

@@ -1,18 +1,18 @@
 """Train a twin: resumable, repeatable, stopped by the validation forecast error."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import lightning as L
 import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 
-from odisar.config.learning import TrainingConfig, TwinConfig
 from odisar.seeding import derive_seed
 from odisar.twin.checkpoints import SafetensorsCheckpointIO, read_checkpoint
 from odisar.twin.devices import pick_device
 from odisar.twin.lightning_module import VALIDATION_METRIC, TwinModule
+from odisar.twin.plan import TrainingPlan
 from odisar.twin.progress import EpochHistory
 from odisar.twin.transformer import TwinTransformer
 from odisar.windows.datamodule import WindowDataModule
@@ -24,16 +24,6 @@ _NETWORK_PREFIX = "network."
 
 
 @dataclass(frozen=True)
-class TrainingPlan:
-    """Everything that decides the weights, besides the windows."""
-
-    twin: TwinConfig
-    training: TrainingConfig
-    seed: int
-    accelerator: str
-
-
-@dataclass(frozen=True)
 class TrainingResult:
     """The network with the lowest validation forecast error, and how it came about.
 
@@ -42,20 +32,13 @@ class TrainingResult:
 
     network: TwinTransformer
     history: list[dict[str, float]]
-    best_validation_mse: float
+    best_validation_loss: float
     windows_seen: int
 
 
 def build_module(plan: TrainingPlan, windows: WindowSet) -> TwinModule:
-    """Return a fresh module whose weights depend on the plan's seed alone."""
-    features = windows.samples.shape[1]
-    return TwinModule(
-        plan.twin,
-        windows.spec,
-        features,
-        plan.training.learning_rate,
-        derive_seed(plan.seed, "twin"),
-    )
+    """Return a fresh module: its weights depend on the plan's seed, closed forms on the windows."""
+    return TwinModule(replace(plan, seed=derive_seed(plan.seed, "twin")), windows)
 
 
 def build_data(plan: TrainingPlan, train: WindowSet, validation: WindowSet) -> WindowDataModule:
@@ -129,7 +112,7 @@ def train_twin(
     return TrainingResult(
         network=network.eval(),
         history=history.rows,
-        best_validation_mse=min(row[VALIDATION_METRIC] for row in history.rows),
+        best_validation_loss=min(row[VALIDATION_METRIC] for row in history.rows),
         windows_seen=len(history.rows) * plan.training.steps_per_epoch * plan.training.batch_size,
     )
 

@@ -20,8 +20,9 @@ from odisar.config.learning import TrainingConfig, TuningConfig, TwinConfig
 from odisar.errors import OdisarError
 from odisar.seeding import derive_seed
 from odisar.twin.lightning_module import VALIDATION_METRIC
+from odisar.twin.plan import TrainingPlan
 from odisar.twin.progress import EpochHistory
-from odisar.twin.training import TrainingPlan, build_data, build_module, build_trainer
+from odisar.twin.training import build_data, build_module, build_trainer
 from odisar.windows.window_set import WindowSet
 
 _FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -32,7 +33,7 @@ class TuningResult:
     """The chosen values, by dotted parameter name, and every trial that led to them."""
 
     best: dict[str, Any]
-    best_validation_mse: float
+    best_validation_loss: float
     trials: list[dict[str, Any]]
 
 
@@ -73,7 +74,7 @@ def tune_twin(
         )
     return TuningResult(
         best=study.best_params,
-        best_validation_mse=study.best_value,
+        best_validation_loss=study.best_value,
         trials=[_trial_row(trial) for trial in study.trials if trial.state in _FINISHED],
     )
 
@@ -162,6 +163,6 @@ def _trial_row(trial: FrozenTrial) -> dict[str, Any]:
     return {
         "number": trial.number,
         "state": trial.state.name.lower(),
-        "validation_forecast_mse": trial.value,
+        "validation_loss": trial.value,
         **trial.params,
     }

@@ -91,7 +91,10 @@ class WindowDataModule(L.LightningDataModule):
     ) -> Batch:
         """Move a batch to the accelerator."""
         return Batch(
-            batch.context.to(device), batch.known_future.to(device), batch.truth.to(device)
+            batch.context.to(device),
+            batch.known_future.to(device),
+            batch.truth.to(device),
+            batch.next_sample.to(device),
         )
 
 

@@ -38,12 +38,18 @@ class WindowSet:
         """Return the number of windows."""
         return len(self.issues)
 
+    @property
+    def channels(self) -> int:
+        """How many channels a sample has."""
+        return int(self._values.shape[1])
+
     def gather(self, windows: torch.Tensor) -> Batch:
         """Return the windows at these positions of the index."""
         issues = self.issues[windows].numpy()
         context, known = model_inputs(self.samples, issues, self.spec, self._values.shape[1])
         targets = horizon_targets(self._values, issues, self.spec)
-        return Batch(context, known, torch.from_numpy(self._scaler.scale_targets(targets)))
+        truth = torch.from_numpy(self._scaler.scale_targets(targets))
+        return Batch(context, known, truth, self.samples[self.issues[windows] + 1])
 
 
 def scaled_features(

@@ -8,21 +8,22 @@ import torch
 from numpy.typing import NDArray
 
 from odisar.recordings.schema import Recording
-from odisar.windows.coordinates import POSE_RATES, PoseChannels
+from odisar.windows.coordinates import POSE_RATES, PoseChannels, feature_positions
 
 
 @dataclass(frozen=True)
 class WindowSpec:
     """Lengths of context and horizon in steps, and which channels stand where.
 
-    ``outputs`` are the positions of the forecast states among the channels; ``known_ahead`` those
-    of the commands whose future the decoder may see; ``pose`` is the pose that the twin sees in
-    relative coordinates, if any.
+    ``outputs`` are the positions of the forecast states among the channels; ``commands`` those of
+    the commands, and ``known_ahead`` of the commands whose future the decoder may see; ``pose`` is
+    the pose that the twin sees in relative coordinates, if any.
     """
 
     context_steps: int
     horizon_steps: int
     outputs: tuple[int, ...]
+    commands: tuple[int, ...]
     known_ahead: tuple[int, ...]
     pose: PoseChannels | None = None
 
@@ -36,6 +37,11 @@ class WindowSpec:
         if self.pose is None:
             return channels
         return channels - len(self.pose.positions) + POSE_RATES
+
+    def state_features(self, channels: int) -> tuple[int, ...]:
+        """Return which features are states: all but the commands."""
+        commands = feature_positions(self.commands, channels, self.pose)
+        return tuple(i for i in range(self.feature_count(channels)) if i not in commands)
 
     def issue_positions(
         self, segment: tuple[int, int], stride_steps: int, *, horizon_steps: int | None = None
@@ -54,13 +60,15 @@ class WindowSpec:
 class Batch:
     """What the twin gets, and the truth it is held against.
 
-    ``context`` (window, context step, feature), ``known_future`` (window, horizon step, command)
-    and ``truth`` (window, horizon step, state), all scaled.
+    ``context`` (window, context step, feature), ``known_future`` (window, horizon step, command),
+    ``truth`` (window, horizon step, state) and ``next_sample`` (window, feature), the sample after
+    the context; all scaled.
     """
 
     context: torch.Tensor
     known_future: torch.Tensor
     truth: torch.Tensor
+    next_sample: torch.Tensor
 
 
 def window_positions(

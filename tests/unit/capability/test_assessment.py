@@ -21,12 +21,16 @@ from odisar.capability.scoring import Scorer
 from odisar.capability.thresholds import sigma_threshold
 from odisar.errors import OdisarError
 from odisar.recordings.schema import Recording
+from small_innovations import small_scorer
 from small_system import make_recording
+
+
+LIMITS = Thresholds(score=4.0, reconstruction=0.1, variance=0.01)
 
 
 def assess(trained_twin, thresholds, recording=None):
     recording = recording or make_recording("assessed", push=0.5)
-    scorer = Scorer(trained_twin, 64, "cpu")
+    scorer = small_scorer(trained_twin)
     scores = scorer.score(recording, short_lead_steps=5)
     capability = Capability(scorer, thresholds, attribution_top=3)
     return capability.assess(recording, scores, stride_steps=10, step_s=1.0)
@@ -69,36 +73,69 @@ def test_an_uncalibrated_capability_refuses_to_answer(trained_twin):
         assess(trained_twin, None)
 
 
+def test_a_capability_without_fitted_innovations_refuses_to_answer(trained_twin):
+    scorer = Scorer(trained_twin, 64, "cpu")
+    recording = make_recording("assessed")
+    scores = scorer.score(recording, short_lead_steps=5)
+    with pytest.raises(OdisarError, match="not calibrated and refuses"):
+        Capability(scorer, LIMITS, attribution_top=3).assess(
+            recording, scores, stride_steps=10, step_s=1.0
+        )
+
+
 def test_every_flag_follows_from_its_score_and_threshold(trained_twin):
-    made = assess(trained_twin, Thresholds(reconstruction=0.1, variance=0.01))
-    assert any(item.is_OOD for item in made)
+    made = assess(trained_twin, LIMITS)
+    assert {item.is_OOD for item in made} == {True, False}
+    assert {item.recon_exceeds_threshold for item in made} == {True, False}
+    assert {item.uncertainty_exceeds_threshold for item in made} == {True, False}
     for item in made:
-        assert item.is_OOD == (item.reconstruction_error > 0.1)
+        assert item.is_OOD == item.score_exceeds_threshold == (item.score > 4.0)
+        assert item.recon_exceeds_threshold == (item.reconstruction_error > 0.1)
         assert item.uncertainty_exceeds_threshold == (item.uncertainty_variance > 0.01)
-        assert bool(item.state_attribution) == item.is_OOD
-        blamed = list(item.state_attribution.values())
-        assert blamed == sorted(blamed, reverse=True)
+        for blame, flag in (
+            (item.state_attribution, item.is_OOD),
+            (item.reconstruction_attribution, item.recon_exceeds_threshold),
+        ):
+            assert bool(blame) == flag
+            blamed = list(blame.values())
+            assert blamed == sorted(blamed, reverse=True)
+
+
+def test_the_papers_flag_neither_makes_nor_breaks_an_assessment(trained_twin):
+    by_score = assess(trained_twin, Thresholds(score=4.0, reconstruction=9.0, variance=0.01))
+    assert [item.is_OOD for item in by_score] == [
+        item.is_OOD for item in assess(trained_twin, LIMITS)
+    ]
+    assert not any(item.reconstruction_attribution for item in by_score)
 
 
 def test_the_horizon_of_an_assessment_begins_after_its_last_sample(trained_twin):
-    made = assess(trained_twin, Thresholds(0.1, 0.01))
+    made = assess(trained_twin, LIMITS)
     assert [item.sequence_index for item in made] == list(range(len(made)))
     first = made[0]
-    assert (first.issued_s, first.start_time_step, first.end_time_step) == (19.0, 20, 29)
-    assert (first.start_s, first.end_s) == (20.0, 29.0)
-    assert made[1].issued_s == 29.0
+    assert (first.issued_s, first.start_time_step, first.end_time_step) == (29.0, 30, 39)
+    assert (first.start_s, first.end_s) == (30.0, 39.0)
+    assert made[1].issued_s == 39.0
 
 
 def test_reported_windows_begin_anew_in_every_segment(trained_twin):
     base = make_recording("gap")
     split = Recording("gap", base.info, base.time_s, base.values, segments=((0, 43), (43, 300)))
-    scores = Scorer(trained_twin, 64, "cpu").score(split, short_lead_steps=5)
-    positions = scores.positions[reported_windows(split, scores, 10)]
-    assert positions[:5].tolist() == [19, 29, 39, 62, 72]
+    scores = small_scorer(trained_twin).score(split, short_lead_steps=5)
+    positions = scores.positions[reported_windows(scores, 10)]
+    assert positions[:4].tolist() == [29, 39, 72, 82]
+
+
+def test_a_segment_too_short_for_a_score_is_not_reported(trained_twin):
+    base = make_recording("gap")
+    split = Recording("gap", base.info, base.time_s, base.values, segments=((0, 29), (29, 300)))
+    scores = small_scorer(trained_twin).score(split, short_lead_steps=5)
+    positions = scores.positions[reported_windows(scores, 10)]
+    assert positions[:2].tolist() == [58, 68]
 
 
 def test_json_fits_the_published_schema_and_the_papers_keys(trained_twin):
-    rows = json.loads(assessments_json(assess(trained_twin, Thresholds(0.1, 0.01))))
+    rows = json.loads(assessments_json(assess(trained_twin, LIMITS)))
     jsonschema.Draft202012Validator.check_schema(assessment_schema())
     papers_keys = {
         "sequence_index",
@@ -121,12 +158,20 @@ def test_an_assessment_that_is_no_number_is_refused(trained_twin):
     values[50:90] = np.nan
     broken = Recording("nan", recording.info, recording.time_s, values)
     with pytest.raises(OdisarError, match=r"no number|does not fit"):
-        assessments_json(assess(trained_twin, Thresholds(0.1, 0.01), broken))
+        assessments_json(assess(trained_twin, LIMITS, broken))
 
 
 def test_the_schema_refuses_flags_that_contradict_the_category(trained_twin):
-    row = json.loads(assessments_json(assess(trained_twin, Thresholds(0.0, 0.0))))[0]
+    row = json.loads(assessments_json(assess(trained_twin, Thresholds(0.0, 0.0, 0.0))))[0]
     jsonschema.validate(row, assessment_schema())
-    for change in ({"category": "green"}, {"state_attribution": {}}, {"extra": 1}):
+    for change in (
+        {"category": "green"},
+        {"state_attribution": {}},
+        {"score_exceeds_threshold": False},
+        {"reconstruction_attribution": {}},
+        {"recon_exceeds_threshold": False},
+        {"score": 0.0},
+        {"extra": 1},
+    ):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(row | change, assessment_schema())

@@ -56,7 +56,7 @@ def edit_sealed(folder, name, change):
 
 def test_what_was_written_is_read(deployed, trained_twin):
     assert deployed.manifest.origin == ORIGIN
-    assert deployed.settings == small_settings()
+    assert deployed.settings == small_settings(trained_twin)
     assert deployed.case == small_case()
     assert deployed.twin.channel_names == trained_twin.channel_names
     for name, weights in trained_twin.network.state_dict().items():
@@ -249,7 +249,7 @@ def test_a_twin_without_spread_is_refused(trained_twin, tmp_path):
             tmp_path / complaint[:3],
             twin,
             small_case(),
-            small_settings(),
+            small_settings(trained_twin),
             ORIGIN,
             small_example(),
         )

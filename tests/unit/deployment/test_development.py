@@ -52,7 +52,7 @@ def test_without_a_stride_it_is_the_auroc_of_protocol_p2(scorer, recordings):
     scores, labels = [], []
     for item in recordings:
         said = scorer.score(item, short_lead_steps=3)
-        settings = small_settings()
+        settings = small_settings(trained_twin)
         scored = ScoredRecording(
             name=item.name,
             info=item.info,

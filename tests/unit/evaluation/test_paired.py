@@ -105,7 +105,7 @@ def test_against_a_constant_the_interval_is_the_detectors_own_shifted(paired, re
 
 
 def test_the_next_best_is_the_best_of_the_others(recordings):
-    table = paired_table({"ferry": recordings}, GROUPS, CONFIG, 6.0, 1, reference="blind")
+    table = paired_table({"ferry": recordings}, GROUPS, CONFIG, 6.0, 1, Comparison("blind"))
     best = table[table["is_next_best"]]
     keys = ["evaluated_on", "strength", "protocol", "metric"]
     assert not best.duplicated(keys).any()
@@ -153,7 +153,7 @@ def test_the_order_of_recordings_has_no_influence(paired, recordings):
 
 def test_a_reference_without_scores_is_refused(recordings):
     with pytest.raises(OdisarError, match="no scores of 'reconstruction' to compare with"):
-        paired_table({"ferry": recordings}, GROUPS, CONFIG, 6.0, 1, reference="reconstruction")
+        paired_table({"ferry": recordings}, GROUPS, CONFIG, 6.0, 1, Comparison("reconstruction"))
 
 
 def seed_table(values, strength=(np.nan, 1.0)):

@@ -1,13 +1,60 @@
-import numpy as np
+"""All detectors of a member speak of the same samples, and none learns from what it judges."""
 
-from odisar.capability.scoring import RecordingScores
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from odisar.baselines.range_rule import range_rule_scores
+from odisar.capability.scoring import DETECTORS, RecordingScores, Scorer
 from odisar.config.cases import RangeRule
+from odisar.config.judging import InnovationConfig
 from odisar.config.loader import load_config
 from odisar.recordings.schema import Recording, RecordingInfo
-from odisar.stages.detectors import detector_scores
+from odisar.stages.detectors import MemberDetectors, fit_innovation_scores, member_reference
+from odisar.stages.members import MemberData
+from small_bundle import small_case
+from small_innovations import small_scorer
+from small_system import make_recording
+
+RULE = {"name": "speed-rule", "channel": "Speed", "min": 0.0, "max": 2.0}
 
 
-def test_range_rules_stand_beside_the_twins_scores_at_the_same_times(request):
+@pytest.fixture(scope="module")
+def data(trained_twin) -> MemberData:
+    """Return the small system as a member has it; its test recordings must never be asked for."""
+    splits = {
+        "train": [make_recording(f"train-{i}") for i in range(3)],
+        "validation": [make_recording(f"validation-{i}") for i in range(2)],
+    }
+    return MemberData(
+        case=small_case(range_rules=[RULE]),
+        splits=splits,
+        scaler=trained_twin.scaler,
+        spec=trained_twin.spec,
+    )
+
+
+class Level:
+    """A detector that says its samples' numbers."""
+
+    def fit(self, reference):
+        """Learn nothing."""
+
+    def score(self, recordings):
+        """Return the numbers."""
+        return [np.arange(1.0, len(item.time_s) + 1) for item in recordings]
+
+
+def asked_of(positions, scores):
+    """Return a scorer that knows these scores alone."""
+    unknown = np.zeros((len(positions), 1))
+    runs = ((0, len(positions)),)
+    known = RecordingScores(positions, scores, unknown, unknown, unknown, runs)
+    return SimpleNamespace(score=lambda _, *, short_lead_steps: known)
+
+
+def test_range_rules_and_alternatives_stand_beside_the_twins_scores_at_the_same_times(request):
     shipped = load_config(request.config.rootpath).cases["gunnerus"]
     rules = [
         shipped.range_rules[0],
@@ -20,10 +67,56 @@ def test_range_rules_stand_beside_the_twins_scores_at_the_same_times(request):
     values[:, case.channel_names.index("Surge Speed")] = 2.0
     recording = Recording("trial", RecordingInfo("gunnerus"), np.arange(60.0), values)
     positions = np.array([30, 49, 59])
-    twin = {"odisar": np.array([0.1, np.nan, 0.3], dtype=np.float32)}
-    found = detector_scores(case, recording, RecordingScores(positions, twin, np.zeros((3, 5))))
-    assert list(found) == ["odisar", "rpm-rule", "surge-rule"]
+    twin = asked_of(positions, {"odisar": np.array([0.1, np.nan, 0.3], dtype=np.float32)})
+    detectors = MemberDetectors(SimpleNamespace(case=case), twin, {"level": Level()})
+    scores, found = detectors.score(recording)
+    assert scores.positions is positions
+    assert list(found) == ["odisar", "level", "rpm-rule", "surge-rule"]
     np.testing.assert_allclose(found["odisar"], [0.1, np.nan, 0.3], rtol=1e-6)
+    np.testing.assert_array_equal(found["level"], [31, 50, 60])
     np.testing.assert_allclose(found["rpm-rule"], [0.0, 1.0, 2.0], atol=1e-6)
     np.testing.assert_allclose(found["surge-rule"], 1.0, atol=1e-6)
     assert {scores.dtype for scores in found.values()} == {np.dtype(np.float64)}
+
+
+def test_every_detector_of_the_twin_each_alternative_and_each_rule_has_a_score(data, trained_twin):
+    detectors = MemberDetectors.fit(data, small_scorer(trained_twin), seed=5)
+    recording = make_recording("scored", 120)
+    scores, found = detectors.score(recording)
+    alternatives = ["mahalanobis", "pca-t2", "pca-spe", "rate-of-change", "stuck"]
+    assert list(found) == [*DETECTORS, *alternatives, "speed-rule"]
+    assert {len(values) for values in found.values()} == {len(scores.positions)}
+    assert all(np.isfinite(values[20:]).all() for values in found.values())
+    for name in DETECTORS:
+        np.testing.assert_array_equal(found[name], scores.scores[name])
+    rule = range_rule_scores(data.case.range_rules[0], recording, data.case, scores.positions)
+    np.testing.assert_array_equal(found["speed-rule"], rule)
+
+
+def test_alternatives_fitted_anew_give_the_same_bytes(data, trained_twin):
+    scorer, recording = small_scorer(trained_twin), make_recording("scored", 120)
+    first = MemberDetectors.fit(data, scorer, seed=5).score(recording)[1]
+    again = MemberDetectors.fit(data, scorer, seed=5).score(recording)[1]
+    assert {k: v.tobytes() for k, v in first.items()} == {k: v.tobytes() for k, v in again.items()}
+
+
+def test_alternatives_learn_from_training_and_validation_recordings_alone(data):
+    reference = member_reference(data, seed=5)
+    assert [item.name for item in reference.train] == ["train-0", "train-1", "train-2"]
+    assert [item.name for item in reference.held_out] == ["validation-0", "validation-1"]
+    assert (reference.case, reference.spec) == (data.case, data.spec)
+
+
+def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second_window(
+    data, trained_twin
+):
+    scorer = Scorer(trained_twin, 64, "cpu")
+    config = InnovationConfig(mean_steps=7, size_steps=3)
+    fitted = fit_innovation_scores(scorer, data, config)
+    assert (fitted.twin.mean.steps, fitted.closed_form.size.steps) == (7, 3)
+    validation = [
+        scorer.score(item, short_lead_steps=3).innovations[1:] for item in data.splits["validation"]
+    ]
+    moment = sum(run.T @ run for run in validation) / sum(map(len, validation))
+    np.testing.assert_allclose(fitted.twin.size.precision, np.linalg.inv(moment), rtol=1e-4)
+    assert not np.allclose(fitted.twin.size.precision, fitted.closed_form.size.precision, rtol=1e-3)

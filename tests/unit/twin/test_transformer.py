@@ -17,6 +17,8 @@ def network(spec: WindowSpec = SPEC, patch_steps: int = 5) -> TwinTransformer:
         reconstruction_dim=16,
         dropout=0.1,
         detach_reconstruction=False,
+        closed_form_lags=5,
+        residual_forecast=False,
     )
     return TwinTransformer(config, spec, 3).eval()
 
@@ -49,7 +51,7 @@ def test_every_input_step_reaches_the_forecast():
 
 
 def test_commands_known_ahead_reach_the_forecast_and_others_cannot():
-    spec = WindowSpec(20, 10, (1, 2), (0,))
+    spec = WindowSpec(20, 10, (1, 2), (0,), (0,))
     twin, context = network(spec), torch.randn(1, 20, 3)
     known = torch.randn(1, 10, 1)
     assert not torch.allclose(twin(context, known).forecast, twin(context, known + 1).forecast)

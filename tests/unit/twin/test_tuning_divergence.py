@@ -56,9 +56,9 @@ def test_a_diverging_trial_counts_as_finished_and_is_never_the_best(plan, window
     result = tune_twin(plan, TUNING, windows, str(tmp_path / "s.journal"), "s")
     assert begun.trials == len(result.trials) == TUNING.trials
     assert [row["state"] for row in result.trials] == ["pruned", "complete", "complete"]
-    errors = [row["validation_forecast_mse"] for row in result.trials[1:]]
-    assert result.best_validation_mse == min(errors)
-    assert math.isfinite(result.best_validation_mse)
+    errors = [row["validation_loss"] for row in result.trials[1:]]
+    assert result.best_validation_loss == min(errors)
+    assert math.isfinite(result.best_validation_loss)
 
 
 def test_a_search_in_which_every_trial_diverges_ends_with_the_way_out(

@@ -18,7 +18,7 @@ from odisar.windows.windowing import WindowSpec
 
 #: x, y, heading [rad], and a speed that is no part of the pose.
 ANGLE = PoseChannels(x=0, y=1, heading=(2,), in_degrees=False)
-SPEC = WindowSpec(8, 4, outputs=(0, 1, 3), known_ahead=(), pose=ANGLE)
+SPEC = WindowSpec(8, 4, outputs=(0, 1, 3), commands=(), known_ahead=(), pose=ANGLE)
 
 
 def circle(samples=60, turn_rad_s=0.5, speed=1.0, jitter=0.0, segments=()):
@@ -90,7 +90,7 @@ def test_targets_go_back_to_the_recorded_states(pose):
         heading = [np.sin(yaw / 2), np.cos(yaw / 2)]
     values = np.column_stack([base.values[:, :2], *heading])
     recording = Recording("r", base.info, base.time_s, values)
-    spec = WindowSpec(8, 4, tuple(range(values.shape[1])), (), pose)
+    spec = WindowSpec(8, 4, tuple(range(values.shape[1])), (), (), pose)
     positions = np.array([10, 30, 50])
     back = recorded_states(horizon_targets(values, positions, spec), recording, positions, spec)
     expected = values[positions[:, None] + np.arange(1, 5)]

@@ -107,7 +107,7 @@ def event_attribution(results: Results, setup: str) -> Figure:
     windows = windows[windows.recording == example["recording"]]
     start_s = float(trace_of(results, case, example["recording"]).time_s.min())
     time = clock(start_s, float(scores.time_s.max() - scores.time_s.min()))
-    states = results.case_of(setup).output_names
+    states = results.case_of(setup).blamed_names
     heights = (2.4, 0.3, max(1.6, _STATE_INCHES * len(states)))
     with figure_style():
         figure = Figure(figsize=(8.4, sum(heights) + 0.3))
@@ -189,7 +189,7 @@ def attribution_shares(results: Results, setup: str) -> Figure:
         ],
     ).sort_values(["place", "strength"], kind="stable")
     names = list(dict.fromkeys(table.row))
-    states = [name for name in results.case_of(setup).output_names if name in set(table.state)]
+    states = [name for name in results.case_of(setup).blamed_names if name in set(table.state)]
     with figure_style():
         figure = Figure(figsize=(8.4, 0.3 * max(len(names), 2) + 1.6))
         grid = figure.subplots(1, 2, sharey=True)

@@ -67,21 +67,21 @@ def _trials(axes: Axes, results: Results, setup: str) -> None:
     complete = trials[trials.state == "complete"]
     pruned = trials[trials.state != "complete"]
     axes.scatter(
-        complete.place, complete.validation_forecast_mse, color=_VALIDATION, s=24, label="complete"
+        complete.place, complete.validation_loss, color=_VALIDATION, s=24, label="complete"
     )
     axes.scatter(
         pruned.place,
-        pruned.validation_forecast_mse,
+        pruned.validation_loss,
         facecolor="none",
         edgecolor="#777777",
         s=24,
         label="pruned",
     )
     if not complete.empty:
-        best = complete.loc[complete.groupby("member").validation_forecast_mse.idxmin()]
+        best = complete.loc[complete.groupby("member").validation_loss.idxmin()]
         axes.scatter(
             best.place,
-            best.validation_forecast_mse,
+            best.validation_loss,
             s=110,
             facecolor="none",
             edgecolor="#D55E00",
@@ -104,4 +104,4 @@ def _all_trials(results: Results, setup: str) -> pd.DataFrame:
         ignore_index=True,
     )
     trials["place"] = trials.number + step * (trials.nth - (len(studies) - 1) / 2)
-    return trials[trials.validation_forecast_mse.notna()]
+    return trials[trials.validation_loss.notna()]

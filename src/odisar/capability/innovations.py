@@ -1,0 +1,203 @@
+"""Innovations: what the twin said about now, against what is observed now.
+
+At time t the forecast of x(t) that was made from samples up to t - 1 is compared with x(t): the
+innovation of state estimation (Bar-Shalom, Li and Kirubarajan, 2001, section 5.4). Two statistics
+of the last innovations look for two kinds of change: T2 of their mean (Hotelling, 1947) grows when
+they lean one way (a bias, a current), the mean of the log normalised innovation squared when they
+scatter more (noise). Their covariance comes from recordings that no weight was fitted to. Each
+statistic, and beside them the reconstruction error of the twin's own forecast (the paper's score),
+is put on the same scale, its log against what is usual on those recordings, and the largest one
+counts: a user need not know in advance which kind of change will come.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odisar.errors import OdisarError
+
+FloatArray = NDArray[np.float64]
+
+#: Added to a covariance, as a share of its mean variance: keeps a state that hardly moves from
+#: making it singular.
+_SHRINKAGE = 1.0e-6
+#: What is usual and what is rare on held-out recordings: 0 and 1 on the common scale.
+_USUAL, _RARE = 0.5, 0.99
+#: Below it a statistic is called zero; its log must stay finite.
+_SMALLEST = 1.0e-12
+
+
+def moving_mean(values: FloatArray, steps: int) -> FloatArray:
+    """Return (time, ...) the mean of the last ``steps`` values; NaN where one is missing."""
+    means = np.full_like(values, np.nan)
+    if len(values) < steps:
+        return means
+    view = np.lib.stride_tricks.sliding_window_view(values, steps, axis=0)
+    means[steps - 1 :] = view.mean(axis=-1)
+    return means
+
+
+def squared_distance(values: FloatArray, precision: FloatArray) -> FloatArray:
+    """Return (time,) squared Mahalanobis distances from zero of (time, feature) values."""
+    return np.asarray(np.einsum("ti,ij,tj->t", values, precision, values))
+
+
+def fit_precision(values: FloatArray) -> FloatArray:
+    """Return (feature, feature) the inverse second moment about zero of (time, feature) values.
+
+    About zero, as an innovation should have no mean: one on held-out recordings is an error too.
+    """
+    known = values[np.isfinite(values).all(axis=1)]
+    if len(known) <= values.shape[1]:
+        raise OdisarError(
+            f"{len(known)} innovations cannot give the covariance of {values.shape[1]} states; "
+            "add validation recordings or shorten the window"
+        )
+    moment = known.T @ known / len(known)
+    moment += _SHRINKAGE * np.trace(moment) / len(moment) * np.eye(len(moment))
+    return np.asarray(np.linalg.inv(moment))
+
+
+@dataclass(frozen=True)
+class LogScale:
+    """The log of a statistic: 0 where held-out recordings usually are, 1 where they rarely are."""
+
+    usual: float
+    rare: float
+
+    @classmethod
+    def fit(cls, statistic: FloatArray) -> Self:
+        """Fit on (time,) values of held-out recordings; NaN don't count."""
+        logs = np.log(np.maximum(statistic[np.isfinite(statistic)], _SMALLEST))
+        usual, rare = np.quantile(logs, [_USUAL, _RARE])
+        return cls(float(usual), float(max(rare, usual + 1e-6)))
+
+    def of(self, statistic: FloatArray) -> FloatArray:
+        """Return (time,) on the scale."""
+        logs = np.log(np.maximum(statistic, _SMALLEST))
+        return np.asarray((logs - self.usual) / (self.rare - self.usual))
+
+
+@dataclass(frozen=True)
+class MeanInnovation:
+    """T2 of the mean of the last ``steps`` innovations; ``precision`` (state, state) is its own."""
+
+    steps: int
+    precision: FloatArray
+    scale: LogScale
+
+    @classmethod
+    def fit(cls, runs: Sequence[FloatArray], steps: int) -> Self:
+        """Fit on gapless runs (time, state) of held-out innovations."""
+        means = np.concatenate([moving_mean(run, steps) for run in runs])
+        precision = fit_precision(means)
+        return cls(steps, precision, LogScale.fit(squared_distance(means, precision)))
+
+    def statistic(self, innovations: FloatArray) -> FloatArray:
+        """Return (time,) T2 along one gapless run (time, state); NaN until enough are known."""
+        return squared_distance(moving_mean(innovations, self.steps), self.precision)
+
+
+@dataclass(frozen=True)
+class InnovationSize:
+    """Mean of log(1 + normalised innovation squared) over the last ``steps``.
+
+    The log keeps a single start or stop, which no twin forecasts, from ruling the mean.
+    """
+
+    steps: int
+    precision: FloatArray
+    scale: LogScale
+
+    @classmethod
+    def fit(cls, runs: Sequence[FloatArray], steps: int) -> Self:
+        """Fit on gapless runs (time, state) of held-out innovations."""
+        precision = fit_precision(np.concatenate(list(runs)))
+        sizes = [cls._of(run, precision, steps) for run in runs]
+        return cls(steps, precision, LogScale.fit(np.concatenate(sizes)))
+
+    def statistic(self, innovations: FloatArray) -> FloatArray:
+        """Return (time,) along one gapless run (time, state); NaN until enough are known."""
+        return self._of(innovations, self.precision, self.steps)
+
+    @staticmethod
+    def _of(innovations: FloatArray, precision: FloatArray, steps: int) -> FloatArray:
+        return moving_mean(np.log1p(squared_distance(innovations, precision)), steps)
+
+
+@dataclass(frozen=True)
+class InnovationSteps:
+    """How the score is put together (``capability.innovation`` in params.yaml).
+
+    ``mean``, ``size`` and ``recent`` are numbers of innovations, ``recent_share`` is the weight of
+    the last statistic.
+    """
+
+    mean: int
+    size: int
+    recent: int
+    recent_share: float
+
+
+@dataclass(frozen=True)
+class InnovationScore:
+    """The monitor's score, as exp of a weighted sum of statistics on their common log scale.
+
+    The largest of T2 of the mean innovation, the size of the innovations and, where there is one,
+    the reconstruction error of the forecast (``reconstruction`` is its scale), which notices what
+    any of them does; and, with weight ``recent_share``, T2 of the mean of very few innovations,
+    which lets go as soon as a disturbance has ended. 1 is what is usual on held-out recordings,
+    e = 2.7 what is rare.
+    """
+
+    mean: MeanInnovation
+    size: InnovationSize
+    recent: MeanInnovation
+    recent_share: float
+    reconstruction: LogScale | None
+
+    @property
+    def known_after_steps(self) -> int:
+        """How many steps after its first forecast a run has its first score."""
+        return max(self.mean.steps, self.size.steps, self.recent.steps)
+
+    @classmethod
+    def fit(
+        cls,
+        runs: Sequence[FloatArray],
+        reconstructions: Sequence[FloatArray] | None,
+        steps: InnovationSteps,
+    ) -> Self:
+        """Fit on gapless runs of held-out recordings.
+
+        ``runs`` are innovations (time, state), ``reconstructions`` reconstruction errors (time,).
+        """
+        scale = None if reconstructions is None else LogScale.fit(np.concatenate(reconstructions))
+        return cls(
+            MeanInnovation.fit(runs, steps.mean),
+            InnovationSize.fit(runs, steps.size),
+            MeanInnovation.fit(runs, steps.recent),
+            steps.recent_share,
+            scale,
+        )
+
+    def parts(self, innovations: FloatArray) -> FloatArray:
+        """Return (2, time) mean and size on their common log scale along one gapless run."""
+        return np.stack(
+            [part.scale.of(part.statistic(innovations)) for part in (self.mean, self.size)]
+        )
+
+    def score(self, innovations: FloatArray, reconstruction: FloatArray) -> FloatArray:
+        """Return (time,) scores along one gapless run; NaN until all statistics are known.
+
+        ``innovations`` (time, state) and ``reconstruction`` (time,) errors, scaled.
+        """
+        lasting = self.parts(innovations).max(axis=0)
+        if self.reconstruction is not None:
+            lasting = np.maximum(lasting, self.reconstruction.of(reconstruction))
+        recent = self.recent.scale.of(self.recent.statistic(innovations))
+        share = self.recent_share
+        return np.asarray(np.exp((1 - share) * lasting + share * recent))
