@@ -11,6 +11,7 @@ TORCH := $(shell sed -n 's/^torch==/torch==/p' constraints.txt)
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+STUDY_INSTALLED := $(VENV)/.study-installed
 ODISAR := $(BIN)/python -m odisar
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PYTHONPATH := $(CURDIR)/src
@@ -19,7 +20,7 @@ export PYTHONUNBUFFERED := 1
 unexport VIRTUAL_ENV
 
 .DEFAULT_GOAL := help
-.PHONY: help setup data accept-data repro smoke real report ui lab test check format clean
+.PHONY: help setup data accept-data repro smoke study-setup study real report ui lab test check format clean
 
 help:  ## List the targets
 	@echo "ODiSAR targets:"
@@ -37,6 +38,11 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@$(BIN)/python -c 'import torch; print("torch", torch.__version__, "- GPU:", torch.cuda.is_available())'
 	@touch $(INSTALLED)
 
+$(STUDY_INSTALLED): $(INSTALLED) pyproject.toml constraints.txt
+	@echo "Installing what the study needs besides ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev,study]"
+	@touch $(STUDY_INSTALLED)
+
 data: $(INSTALLED)  ## Make the recordings and check them against data.dvc
 	@$(ODISAR) data
 
@@ -49,7 +55,13 @@ repro: $(INSTALLED)  ## Recordings, whole pipeline, result table, report
 smoke: $(INSTALLED)  ## The whole pipeline on a small profile, in workspaces/smoke
 	@$(ODISAR) profile smoke
 
-real: $(INSTALLED)  ## The same pipeline on R/V Gunnerus' sea trial, in workspaces/real
+study-setup: $(STUDY_INSTALLED)  ## Install what the study's alternatives need besides
+
+study: $(STUDY_INSTALLED)  ## After `make repro`: all alternatives, seeds, forecasts (over an hour)
+	@$(BIN)/python -m dvc repro study/dvc.yaml
+	@$(ODISAR) report
+
+real: $(INSTALLED)  ## The same pipeline on real recordings, in workspaces/real
 	@$(ODISAR) profile real
 
 report: $(INSTALLED)  ## Execute the notebooks and write reports/report.html

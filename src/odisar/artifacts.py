@@ -79,6 +79,16 @@ class Workspace:
         """Return what calibration found of a set-up's predictive distributions."""
         return self.calibrate / f"{setup}.distribution.json"
 
+    @property
+    def study(self) -> Path:
+        """What the study has trained and scored."""
+        return self.root / "build/study"
+
+    @property
+    def study_results(self) -> Path:
+        """Result tables of the study, committed."""
+        return self.root / "reports/study"
+
     def recordings(self, case: str) -> Path:
         """Return the store of a case's checked recordings."""
         return self.preprocess / case

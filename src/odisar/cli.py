@@ -48,6 +48,13 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("repro", help="recordings, pipeline, result table")
     profile = commands.add_parser("profile", help="run the pipeline with a profile's parameters")
     profile.add_argument("name")
+    study = commands.add_parser("study", help="run one part of the study (study/dvc.yaml does)")
+    study.add_argument("part")
+    study.add_argument("setup", nargs="?", help="of a part that is run once for each set-up")
+    leakage = commands.add_parser("leakage", help="probe your own score for what it may not know")
+    leakage.add_argument("model", help="package.module:function, recordings to arrays of scores")
+    leakage.add_argument("--setup", required=True, help="whose recordings it is probed on")
+    leakage.add_argument("--delay-steps", type=int, default=0, help="how late it may notice")
     commands.add_parser("init-store", help="create the MLflow database")
     report = commands.add_parser("report", help="bring the report up to date (make repro first)")
     results = commands.add_parser("results", help="print the result table")
@@ -100,6 +107,20 @@ def _profile(root: Path, options: argparse.Namespace) -> None:
     from odisar.workspaces import lay_out
 
     reproduce_profile(root, lay_out(root, options.name))
+
+
+def _study(root: Path, options: argparse.Namespace) -> None:
+    from odisar.study.runner import run_part
+
+    run_part(options.part, options.setup, root)
+
+
+def _leakage(root: Path, options: argparse.Namespace) -> int:
+    from odisar.study.leakage import probe_own_model
+
+    report = probe_own_model(root, options.model, options.setup, options.delay_steps)
+    print("\n".join(report.sentences()))
+    return 0 if report.passed else 1
 
 
 def _init_store(root: Path, _options: argparse.Namespace) -> None:
@@ -159,6 +180,8 @@ _COMMANDS: dict[str, Callable[[Path, argparse.Namespace], int | None]] = {
     "data": _data,
     "repro": _repro,
     "profile": _profile,
+    "study": _study,
+    "leakage": _leakage,
     "init-store": _init_store,
     "report": _report,
     "results": _results,

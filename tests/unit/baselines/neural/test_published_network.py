@@ -11,7 +11,7 @@ from odisar.errors import OdisarError
 from odisar.windows.windowing import Batch, WindowSpec
 
 STEPS = 8
-SPEC = WindowSpec(STEPS, STEPS, outputs=(1, 2), known_ahead=())
+SPEC = WindowSpec(STEPS, STEPS, outputs=(1, 2), commands=(0,), known_ahead=())
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,260 @@
+"""Tables of forecast accuracy: every forecaster on the same undisturbed windows, with intervals.
+
+Errors are squared and summed for each recording; everything else, the intervals too, comes from
+these sums (see ``evaluation.intervals``).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from odisar.config.judging import EvaluationConfig
+from odisar.errors import OdisarError
+from odisar.evaluation.intervals import Resampler
+from odisar.recordings.schema import Recording
+from odisar.seeding import generator
+from odisar.windows.scaling import Scaler
+from odisar.windows.window_set import WindowSet
+from odisar.windows.windowing import WindowSpec
+
+#: (window, context step, feature) and (window, horizon step, command) to (window, step, state).
+Forecast = Callable[[torch.Tensor, torch.Tensor], ArrayLike]
+
+#: The forecaster that skill is counted from; the row over all states, and that over all steps.
+PERSISTENCE, ALL_STATES, ALL_STEPS = "persistence", "all", 0
+
+FORECAST_COLUMNS = (
+    "setup",
+    "forecaster",
+    "commands",
+    "state",
+    "step",
+    "rmse",
+    "ci_low",
+    "ci_high",
+    "rmse_physical",
+    "skill",
+    "recordings",
+    "windows",
+)
+FORECAST_PAIR_COLUMNS = (
+    "setup",
+    "commands",
+    "forecaster",
+    "against",
+    "mse_ratio",
+    "ci_low",
+    "ci_high",
+)
+
+#: Windows forecast at a time; a matter of memory, not of results.
+_BATCH = 256
+
+Row = dict[str, object]
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ForecastErrors:
+    """What every forecaster erred by, summed over the windows of each recording.
+
+    Attributes
+    ----------
+    squares
+        By forecaster, (recording, step, state) sums of squared errors, scaled.
+    windows
+        (recording,) how many windows were summed; none of them zero.
+    clusters
+        (recording,) recordings that vary together share one.
+    target_std
+        (state,) what one scaled unit is in physical ones.
+    commands
+        ``known-ahead`` where the commands of the horizon were given, else ``unknown``.
+    """
+
+    squares: Mapping[str, FloatArray]
+    windows: FloatArray
+    clusters: tuple[str, ...]
+    target_std: FloatArray
+    commands: str
+
+
+def forecast_errors(
+    recordings: Sequence[Recording],
+    scaler: Scaler,
+    spec: WindowSpec,
+    forecasters: Mapping[str, Forecast],
+    stride_steps: int,
+) -> ForecastErrors:
+    """Forecast every ``stride_steps``-th window of undisturbed recordings and sum the errors.
+
+    Raises OdisarError where a recording is disturbed (no forecaster was promised to know that),
+    where none holds a window, or where a forecaster answers with an array of another shape.
+    """
+    for recording in recordings:
+        if recording.info.is_disturbed:
+            raise OdisarError(
+                f"recording {recording.name!r} is disturbed ({recording.info.disturbance}); "
+                "forecast accuracy is that of undisturbed recordings: leave it out"
+            )
+    ordered = sorted(recordings, key=lambda item: item.name)
+    windows = [WindowSet([item], scaler, spec, stride_steps=stride_steps) for item in ordered]
+    used = [i for i, item in enumerate(windows) if len(item)]
+    if not used:
+        raise OdisarError(
+            f"none of {len(ordered)} recordings holds a window of {spec.context_steps} + "
+            f"{spec.horizon_steps} steps; forecasts need longer recordings to be judged on"
+        )
+    sums = [_recording_squares(windows[i], forecasters) for i in used]
+    return ForecastErrors(
+        squares={name: np.stack([item[name] for item in sums]) for name in forecasters},
+        windows=np.array([len(windows[i]) for i in used], dtype=np.float64),
+        clusters=tuple(ordered[i].info.base_seed or ordered[i].name for i in used),
+        target_std=scaler.target_std,
+        commands="known-ahead" if spec.known_ahead else "unknown",
+    )
+
+
+def forecast_table(
+    setup: str,
+    errors: ForecastErrors,
+    states: Sequence[str],
+    steps: Sequence[int],
+    cfg: EvaluationConfig,
+    base_seed: int,
+) -> pd.DataFrame:
+    """Return the tidy table of accuracy, ``FORECAST_COLUMNS``, by forecaster, state and step.
+
+    ``rmse`` and its interval are scaled, ``rmse_physical`` in the state's unit. State ``all``
+    pools the scaled states (it has no unit), step 0 all steps. ``skill`` is 1 - MSE / MSE of
+    persistence; empty where persistence isn't among the forecasters.
+    """
+    resampler = _resampler(setup, errors, cfg, base_seed)
+    reference = errors.squares.get(PERSISTENCE)
+    rows: list[Row] = []
+    for name, squares in errors.squares.items():
+        for cell in _cells(states, steps, squares.shape):
+            pooled = cell.pooled(squares)
+            mse = pooled.sum() / errors.windows.sum()
+            drawn = resampler.totals(pooled) / _drawn_windows(resampler, errors)
+            low, high = resampler.interval(np.sqrt(drawn))
+            held = np.nan if reference is None else cell.pooled(reference).sum()
+            rows.append(
+                {
+                    "setup": setup,
+                    "forecaster": name,
+                    "commands": errors.commands,
+                    "state": cell.state,
+                    "step": cell.step,
+                    "rmse": np.sqrt(mse),
+                    "ci_low": low,
+                    "ci_high": high,
+                    "rmse_physical": np.sqrt(mse) * cell.unit(errors.target_std),
+                    "skill": 1.0 - pooled.sum() / held if held > 0 else np.nan,
+                    "recordings": len(errors.windows),
+                    "windows": int(errors.windows.sum()),
+                }
+            )
+    return pd.DataFrame(rows, columns=list(FORECAST_COLUMNS))
+
+
+def forecast_pairs(
+    setup: str, errors: ForecastErrors, cfg: EvaluationConfig, base_seed: int
+) -> pd.DataFrame:
+    """Return ``FORECAST_PAIR_COLUMNS``: the ratio of mean squared errors of every two forecasters.
+
+    Over all states and steps. Both meet the same recordings in every draw, so the interval is that
+    of their difference: it may leave 1 out where those of the two alone overlap.
+    """
+    resampler = _resampler(setup, errors, cfg, base_seed)
+    totals = {name: squares.mean(axis=(1, 2)) for name, squares in errors.squares.items()}
+    rows: list[Row] = []
+    for name, against in combinations(totals, 2):
+        drawn = resampler.totals(totals[name]) / resampler.totals(totals[against])
+        low, high = resampler.interval(drawn)
+        rows.append(
+            {
+                "setup": setup,
+                "commands": errors.commands,
+                "forecaster": name,
+                "against": against,
+                "mse_ratio": totals[name].sum() / totals[against].sum(),
+                "ci_low": low,
+                "ci_high": high,
+            }
+        )
+    return pd.DataFrame(rows, columns=list(FORECAST_PAIR_COLUMNS))
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """The states and steps that one row pools."""
+
+    state: str
+    step: int
+    states: slice
+    steps: slice
+
+    def pooled(self, squares: FloatArray) -> FloatArray:
+        """Return (recording,) sums over windows of the mean over the cell's steps and states."""
+        return np.asarray(squares[:, self.steps, self.states].mean(axis=(1, 2)))
+
+    def unit(self, target_std: FloatArray) -> float:
+        """Return what one scaled unit is in the state's own; NaN where states are pooled."""
+        return float("nan") if self.state == ALL_STATES else float(target_std[self.states][0])
+
+
+def _cells(states: Sequence[str], steps: Sequence[int], shape: tuple[int, ...]) -> list[_Cell]:
+    _, horizon_steps, count = shape
+    wrong = [step for step in steps if not 1 <= step <= horizon_steps]
+    if wrong or len(states) != count:
+        raise OdisarError(
+            f"forecasts have {count} states and steps 1 to {horizon_steps}; asked for were the "
+            f"states {list(states)} and the steps {list(steps)}"
+        )
+    chosen_states = [(ALL_STATES, slice(None))]
+    chosen_states += [(name, slice(i, i + 1)) for i, name in enumerate(states)]
+    chosen_steps = [(ALL_STEPS, slice(None)), *((step, slice(step - 1, step)) for step in steps)]
+    return [
+        _Cell(state, step, at_states, at_steps)
+        for state, at_states in chosen_states
+        for step, at_steps in chosen_steps
+    ]
+
+
+def _recording_squares(
+    windows: WindowSet, forecasters: Mapping[str, Forecast]
+) -> dict[str, FloatArray]:
+    """Return, by forecaster, (step, state) sums of squared errors over all windows."""
+    shape = (windows.spec.horizon_steps, len(windows.spec.outputs))
+    sums = {name: np.zeros(shape) for name in forecasters}
+    for start in range(0, len(windows), _BATCH):
+        batch = windows.gather(torch.arange(start, min(start + _BATCH, len(windows))))
+        truth = batch.truth.double().numpy()
+        for name, forecast in forecasters.items():
+            with torch.no_grad():
+                found = np.asarray(forecast(batch.context, batch.known_future), dtype=np.float64)
+            if found.shape != truth.shape:
+                raise OdisarError(
+                    f"forecaster {name!r} answers {found.shape} where windows, steps and states "
+                    f"are {truth.shape}"
+                )
+            sums[name] += np.sum((found - truth) ** 2, axis=0)
+    return sums
+
+
+def _resampler(
+    setup: str, errors: ForecastErrors, cfg: EvaluationConfig, base_seed: int
+) -> Resampler:
+    # Named without forecaster and commands: all are compared on the same draws.
+    rng = generator(base_seed, "forecasts", setup)
+    return Resampler.draw(errors.clusters, cfg.bootstrap_draws, cfg.confidence, rng)
+
+
+def _drawn_windows(resampler: Resampler, errors: ForecastErrors) -> FloatArray:
+    return resampler.totals(errors.windows)

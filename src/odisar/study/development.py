@@ -1,0 +1,194 @@
+"""Scores on development recordings: what the default was chosen by, and what else there was.
+
+The rule: of the candidates, the one with the highest mean over set-ups of the mean over cells (kind
+and strength) of (AUROC + TNR@TPR95) / 2 by protocol P2. No test recording has a part in it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from odisar.artifacts import Workspace, write_table
+from odisar.capability.innovations import (
+    FloatArray,
+    InnovationSize,
+    LogScale,
+    MeanInnovation,
+    fit_precision,
+    moving_mean,
+    squared_distance,
+)
+from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
+from odisar.config.loader import ConfigView
+from odisar.errors import OdisarError
+from odisar.evaluation.labels import label_active
+from odisar.evaluation.metrics import auroc, tnr_at_tpr95
+from odisar.recordings.schema import Recording
+from odisar.stages.members import Member, MemberData, load_member
+from odisar.study.statistics import exponential_mean, lead_errors, regime_distance
+from odisar.twin.bundle import read_twin
+from odisar.twin.devices import pick_device
+
+PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "study")
+
+#: Steps of the windows that are tried, and leads of forecasts that are compared with now.
+_WINDOWS, _LEADS = (1, 3, 5, 10, 20), (5, 10)
+_WEIGHTS = (0.1, 0.3)
+
+#: (time,) statistics of one recording by name, on their log scale.
+Statistics = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those."""
+
+    name: str
+    parts: int
+    of: Callable[[Statistics], FloatArray]
+
+
+def candidates() -> list[Candidate]:
+    """Return every candidate, in the order of the table."""
+    singles = [f"T2 of mean over {k}" for k in _WINDOWS]
+    singles += [f"T2 of exponential mean, weight {a:g}" for a in _WEIGHTS]
+    singles += ["log NIS over 5", "log NIS over 10", "log NIS over 5, by regime"]
+    singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in _LEADS]
+    singles += [RECONSTRUCTION]
+    both = ("T2 of mean over 10", "log NIS over 5")
+    three, recent = (*both, RECONSTRUCTION), "T2 of mean over 3"
+    made = [Candidate(name, 1, lambda s, n=name: s[n]) for name in singles]  # type: ignore[misc]
+    made += [
+        Candidate("larger of mean and size", 2, lambda s: _largest(s, both)),
+        Candidate("largest of mean, size, reconstruction", 3, lambda s: _largest(s, three)),
+        Candidate(
+            "largest of three, and recent (.7, .3)",
+            4,
+            lambda s: 0.7 * _largest(s, three) + 0.3 * s[recent],
+        ),
+        Candidate(
+            "largest of three, and recent (.5, .5)",
+            4,
+            lambda s: 0.5 * _largest(s, three) + 0.5 * s[recent],
+        ),
+    ]
+    return made
+
+
+def run(config: ConfigView, workspace: Workspace) -> None:
+    """Write development.csv: every candidate on every cell, with the rule's mean and rank."""
+    rows = []
+    for setup in config.study.setups:
+        data = load_member(config, workspace, Member(setup, None))
+        twin = read_twin(workspace.twin(setup))
+        device = pick_device(config.pipeline.accelerator)
+        scorer = Scorer(twin, config.capability.scoring_batch, device)
+        rows += _setup_rows(setup, data, scorer)
+    if not rows:
+        raise OdisarError(
+            "the development recordings of study.setups hold no disturbance to choose a score by; "
+            "add some (simulators.*.fleet.disturbed.development)"
+        )
+    table = pd.DataFrame(rows)
+    write_table(workspace.study_results / "development.csv", ranked(table))
+
+
+def ranked(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table with each candidate's mean by the rule, and its rank, 1 for the chosen."""
+    half = (table.auroc + table.tnr_at_tpr95) / 2
+    by_setup = half.groupby([table.candidate, table.setup], sort=False).mean()
+    mean = by_setup.groupby("candidate", sort=False).mean()
+    order = mean.sort_values(ascending=False, kind="stable").index
+    place = {name: number for number, name in enumerate(order, start=1)}
+    return table.assign(rule_mean=table.candidate.map(mean), rank=table.candidate.map(place))
+
+
+def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, object]]:
+    lead = data.case.short_lead_steps
+    held_out = [(i, scorer.score(i, short_lead_steps=lead)) for i in data.splits["validation"]]
+    makers = fit_statistics(data, scorer, held_out)
+    cells: dict[tuple[str, float], list[tuple[Statistics, NDArray[np.bool_]]]] = {}
+    for item in data.splits["development"]:
+        if item.info.is_disturbed:
+            scores = scorer.score(item, short_lead_steps=lead)
+            made = {name: make(item, scores) for name, make in makers.items()}
+            labels = label_active(item.time_s[scores.positions], item.intervals)
+            key = (item.info.disturbance, item.info.strength or 0.0)
+            key = ("all", key[1]) if data.case.pose is None else key
+            cells.setdefault(key, []).append((made, labels))
+    return [
+        {
+            "setup": setup,
+            "candidate": one.name,
+            "parts": one.parts,
+            "kind": kind,
+            "strength": strength,
+            "recordings": len(members),
+            **_judged(one, members, data.spec.horizon_steps),
+        }
+        for one in candidates()
+        for (kind, strength), members in sorted(cells.items())
+    ]
+
+
+def _judged(
+    one: Candidate, members: list[tuple[Statistics, NDArray[np.bool_]]], horizon_steps: int
+) -> dict[str, float]:
+    # As in the pipeline's tables, time before a forecast error could be known is left out.
+    scores = np.concatenate([one.of(made)[horizon_steps:] for made, _ in members])
+    labels = np.concatenate([labels[horizon_steps:] for _, labels in members])
+    known = np.isfinite(scores)
+    return {
+        "auroc": auroc(scores[known], labels[known]),
+        "tnr_at_tpr95": tnr_at_tpr95(scores[known], labels[known]),
+    }
+
+
+def _largest(statistics: Statistics, names: tuple[str, ...]) -> FloatArray:
+    return np.asarray(np.max([statistics[name] for name in names], axis=0))
+
+
+HeldOut = list[tuple[Recording, RecordingScores]]
+Maker = Callable[[Recording, RecordingScores], FloatArray]
+
+
+def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[str, Maker]:
+    """Return, by name, what makes (time,) of each statistic on its log scale."""
+    runs = [s.innovations[a + 1 : b] for _, s in held_out for a, b in s.runs]
+    raw: dict[str, Maker] = {}
+    for steps in _WINDOWS:
+        mean = MeanInnovation.fit(runs, steps)
+        raw[f"T2 of mean over {steps}"] = _along(mean.statistic)
+    for weight in _WEIGHTS:
+        raw[f"T2 of exponential mean, weight {weight:g}"] = _along(_exponential(runs, weight))
+    for steps in (5, 10):
+        raw[f"log NIS over {steps}"] = _along(InnovationSize.fit(runs, steps).statistic)
+    by_regime = regime_distance(data, held_out)
+    raw["log NIS over 5, by regime"] = lambda item, s: moving_mean(np.log1p(by_regime(item, s)), 5)
+    for lead in _LEADS:
+        raw[f"T2 of errors {lead} ahead, mean over 10"] = lead_errors(
+            data, scorer, [item for item, _ in held_out], lead, 10
+        )
+    raw[RECONSTRUCTION] = lambda _, s: s.scores[RECONSTRUCTION].astype(np.float64)
+    return {name: _scaled(make, held_out) for name, make in raw.items()}
+
+
+def _exponential(runs: list[FloatArray], weight: float) -> Callable[[FloatArray], FloatArray]:
+    precision = fit_precision(np.concatenate([exponential_mean(run, weight) for run in runs]))
+    return lambda innovations: squared_distance(exponential_mean(innovations, weight), precision)
+
+
+def _along(statistic: Callable[[FloatArray], FloatArray]) -> Maker:
+    def make(_: Recording, scores: RecordingScores) -> FloatArray:
+        parts = [statistic(scores.innovations[a:b]) for a, b in scores.runs]
+        return np.concatenate(parts)
+
+    return make
+
+
+def _scaled(make: Maker, held_out: HeldOut) -> Maker:
+    scale = LogScale.fit(np.concatenate([make(item, scores) for item, scores in held_out]))
+    return lambda item, scores: scale.of(make(item, scores))

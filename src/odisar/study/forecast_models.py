@@ -1,0 +1,141 @@
+"""The forecasters of the study by name, and trainings of the twin as forecasters among them."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from odisar.config.loader import ConfigView
+from odisar.config.study import FitConfig
+from odisar.forecasters.constant_velocity import ConstantVelocity
+from odisar.forecasters.direct_linear import DirectLinear
+from odisar.forecasters.fitting import FittingPlan
+from odisar.forecasters.gru import GruForecaster, GruSize
+from odisar.forecasters.interface import Forecaster
+from odisar.forecasters.persistence import Persistence
+from odisar.forecasters.pilot import (
+    GanForecaster,
+    GenerativeSize,
+    RnnForecaster,
+    RnnSize,
+    VaeForecaster,
+)
+from odisar.forecasters.published_mixer import MixerForecaster, MixerSize
+from odisar.seeding import derive_seed
+from odisar.stages.members import MemberData
+from odisar.twin.plan import TrainingPlan
+from odisar.twin.training import train_twin
+from odisar.windows.window_set import WindowSet
+
+#: A step of a forecaster sees this many windows of the twin's; validation every so many steps.
+_LAGS_STEPS, _PENALTIES = (10, 30, 60), (1e-6, 1e-4, 1e-2, 1.0)
+_SLOPE_STEPS, _DAMPINGS = (1, 3, 5, 10), (0.0, 0.5, 0.8, 0.9, 0.95, 0.98)
+#: Epochs into which a twin's share of the budget is divided.
+_EPOCHS = 6
+
+
+@dataclass(frozen=True)
+class TwinForm:
+    """A twin that is compared as a forecaster: changes of its configuration and training."""
+
+    twin: dict[str, Any]
+    training: dict[str, Any]
+
+
+#: ``paper``: its table of parameters, one step a token, plain errors. ``plain``: ours in all but
+#: the loss. ``weighed``: the default. ``residual``: the horizon too stands on a closed form.
+TWINS = {
+    "paper-transformer": TwinForm(
+        {"patch_steps": 1, "residual_forecast": False},
+        {"weigh_loss": False, "learning_rate": 1.0e-4},
+    ),
+    "transformer": TwinForm({"residual_forecast": False}, {"weigh_loss": False}),
+    "weighed-transformer": TwinForm({"residual_forecast": False}, {"weigh_loss": True}),
+    "residual-transformer": TwinForm({"residual_forecast": True}, {"weigh_loss": True}),
+}
+
+
+class TwinForecaster:
+    """A twin trained as the pipeline does, with a share of its windows."""
+
+    def __init__(self, form: TwinForm, plan: TrainingPlan, scratch: Path, name: str) -> None:
+        self._plan = replace(
+            plan,
+            twin=plan.twin.model_copy(update=form.twin),
+            training=plan.training.model_copy(update=form.training),
+        )
+        self._scratch, self._name = scratch, name
+        self.cpu_s = 0.0
+        self.history: list[dict[str, float]] = []
+        self._network: Callable[..., Any] | None = None
+
+    def fit(self, train: WindowSet, validation: WindowSet) -> None:
+        """Train, from the start: the time of a resumed training says nothing."""
+        before_s = time.process_time()
+        trained = train_twin(self._plan, train, validation, self._scratch, name=self._name)
+        self.cpu_s = time.process_time() - before_s
+        self.history, self._network = trained.history, trained.network
+
+    @torch.inference_mode()
+    def forecast(self, context: torch.Tensor, known_future: torch.Tensor) -> torch.Tensor:
+        """Return (window, horizon step, state), scaled."""
+        assert self._network is not None  # noqa: S101 (fitted before)
+        forecast: torch.Tensor = self._network(context, known_future).forecast
+        return forecast
+
+
+def twin_forecaster(name: str, plan: TrainingPlan, fit: FitConfig, scratch: Path) -> TwinForecaster:
+    """Return a twin that sees as many windows as the other forecasters, in batches of its own."""
+    windows = fit.steps * fit.batch_size
+    steps = max(1, windows // (plan.training.batch_size * _EPOCHS))
+    # A rate that suits a short training; the form may have its own.
+    budget = {
+        "epochs": _EPOCHS,
+        "patience_epochs": _EPOCHS,
+        "steps_per_epoch": steps,
+        "learning_rate": fit.learning_rate / 2,
+    }
+    form = TWINS[name]
+    return TwinForecaster(TwinForm(form.twin, budget | form.training), plan, scratch, name)
+
+
+def simple_forecasters(
+    config: ConfigView, data: MemberData, fit: FitConfig
+) -> dict[str, Callable[[], Forecaster]]:
+    """Return what makes each forecaster that is no twin, by name; ``data.spec`` says the rest."""
+    scaler, spec, rate_hz = data.scaler, data.spec, data.case.rate_hz
+    plan = _fitting(config, fit)
+    mixer = MixerSize(config.twin.patch_steps, 32, 3, 0.1)
+    return {
+        "persistence": lambda: Persistence(scaler, spec),
+        "constant-velocity": lambda: ConstantVelocity(
+            scaler, spec, rate_hz, _SLOPE_STEPS, _DAMPINGS
+        ),
+        "closed-form": lambda: DirectLinear(scaler, spec, _LAGS_STEPS, _PENALTIES),
+        "gru": lambda: GruForecaster(GruSize(64, 128), plan),
+        "patch-ts-mixer": lambda: MixerForecaster(mixer, plan),
+    }
+
+
+def pilot_forecasters(config: ConfigView, fit: FitConfig) -> dict[str, Callable[[], Forecaster]]:
+    """Return what makes each model of the paper's pilot study but the Transformer, by name."""
+    plan = _fitting(config, fit)
+    return {
+        "rnn": lambda: RnnForecaster(RnnSize(64), plan),
+        "vae": lambda: VaeForecaster(GenerativeSize(128, 16, 0.01), plan),
+        "gan": lambda: GanForecaster(GenerativeSize(128, 16, 0.01), plan),
+    }
+
+
+def _fitting(config: ConfigView, fit: FitConfig) -> FittingPlan:
+    return FittingPlan(
+        steps=fit.steps,
+        batch_size=fit.batch_size,
+        learning_rate=fit.learning_rate,
+        gradient_clip=config.training.gradient_clip,
+        validations=fit.validations,
+        seed=derive_seed(config.seed, "forecasters"),
+    )

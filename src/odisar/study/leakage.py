@@ -1,0 +1,61 @@
+"""Probe the published recipe, which leaks, and a user's own model."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from odisar.artifacts import Workspace, write_table
+from odisar.baselines.neural.registry import NOT_DEPLOYABLE
+from odisar.config.loader import Config, ConfigView, load_config
+from odisar.errors import OdisarError
+from odisar.evaluation.leakage import probe_leakage
+from odisar.evaluation.leakage_report import LeakageReport, leakage_table
+from odisar.evaluation.own_model import load_own_model
+from odisar.seeding import derive_seed
+from odisar.stages.detectors import member_reference
+from odisar.stages.leakage import probe, probed_recordings
+from odisar.stages.members import load_member, setup_members
+from odisar.study.alternatives import all_alternatives
+from odisar.windows.scaling import channel_std
+
+PARAMS = ("seed", "pipeline", "setups", "cases", "study")
+
+
+def run(config: ConfigView, workspace: Workspace) -> None:
+    """Write leakage.csv: the recipe as published, and with its last state for the future.
+
+    The first of the study's set-ups is taken. The other detectors are probed by the pipeline.
+    """
+    setup = config.study.setups[0]
+    data = load_member(config, workspace, setup_members(config, setup)[0])
+    reference, made = member_reference(data, config.seed), all_alternatives(config)
+    reports = []
+    for name in NOT_DEPLOYABLE:
+        detector = made[name]()
+        detector.fit(reference)
+        reports.append(probe(data, name, detector.score, probed_recordings(data), config.seed))
+    table = leakage_table(reports).assign(setup=setup, member=setup)
+    write_table(workspace.study_results / "leakage.csv", pd.DataFrame(table))
+
+
+def probe_own_model(root: Path, model: str, setup: str, delay_steps: int) -> LeakageReport:
+    """Probe a user's own score on beginnings of calibration recordings of a set-up.
+
+    ``model`` is ``package.module:function``, looked for from the current folder first. Raises
+    OdisarError for an unknown set-up, or a model that can't be found or called.
+    """
+    config: Config = load_config(root)
+    if setup not in config.setups:
+        raise OdisarError(f"set-up {setup!r} is not declared; declared: {', '.join(config.setups)}")
+    view = ConfigView(config, PARAMS)
+    data = load_member(view, Workspace(root), setup_members(view, setup)[0])
+    own = load_own_model(model, Path.cwd())
+    return probe_leakage(
+        own.name,
+        own.score,
+        probed_recordings(data),
+        std=channel_std(data.splits["train"]),
+        seed=derive_seed(config.seed, "leakage"),
+        states=[i for i, c in enumerate(data.case.channels) if c.role == "state"],
+        control_delay_steps=delay_steps,
+    )

@@ -1,0 +1,49 @@
+"""Run one part of the study."""
+
+import importlib
+import os
+from pathlib import Path
+
+from odisar.artifacts import Workspace
+from odisar.config.loader import ConfigView, load_config
+from odisar.errors import OdisarError
+from odisar.twin.devices import use_one_thread
+
+#: Parts by the module that runs them; those of a set-up are run once for each.
+PARTS = (
+    "alternatives",
+    "comparing",
+    "confidence",
+    "development",
+    "forecasting",
+    "leakage",
+    "seeds",
+)
+
+# NumPy's threads would compete with the processes that share the cores.
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def run_part(name: str, setup: str | None, root: Path) -> None:
+    """Run the part ``name`` in the workspace ``root``, for one set-up or for all.
+
+    Raises OdisarError for an unknown part or set-up, or where the pipeline hasn't run yet.
+    """
+    for variable in _ONE_THREAD:
+        os.environ.setdefault(variable, "1")
+    use_one_thread()
+    if name not in PARTS:
+        raise OdisarError(f"the study has no part {name!r}; parts are {', '.join(PARTS)}")
+    config, workspace = load_config(root), Workspace(root)
+    part = importlib.import_module(f"odisar.study.{name}")
+    if setup is not None and setup not in config.study.setups:
+        raise OdisarError(
+            f"set-up {setup!r} is not among study.setups: {', '.join(config.study.setups)}"
+        )
+    if not workspace.evaluate.is_dir():
+        raise OdisarError("the study stands on the pipeline's results; run `make repro` first")
+    view = ConfigView(config, part.PARAMS)
+    if setup is None:
+        part.run(view, workspace)
+    else:
+        part.run(view, workspace, setup)
