@@ -53,6 +53,7 @@ def reference_of(case: Case, train: list[Recording], held_out: list[Recording]) 
         case.window.context_steps,
         case.window.horizon_steps,
         tuple(case.output_indices),
+        tuple(case.command_indices),
         (),
         pose_channels(case),
     )

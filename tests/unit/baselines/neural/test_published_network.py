@@ -27,6 +27,7 @@ def batch() -> Batch:
         torch.randn((6, STEPS, 3), generator=random),
         torch.empty(6, STEPS, 0),
         torch.randn((6, STEPS, 2), generator=random),
+        torch.randn((6, 3), generator=random),
     )
 
 
