@@ -40,7 +40,7 @@ def recordings():
 
 @pytest.fixture(scope="module")
 def paired(recordings):
-    return paired_table({"ferry": recordings}, GROUPS, CONFIG, 6.0, 1)
+    return paired_table({"ferry": recordings}, GROUPS, CONFIG, 6.0, 1, Comparison("odisar"))
 
 
 def chosen(table, **values):
@@ -84,7 +84,7 @@ def test_an_interval_in_pairs_is_narrower_than_two_intervals_apart(recordings):
         recordings,
         lambda item: {"near": item.scores["odisar"] + 0.1 * random.normal(size=len(item.time_s))},
     )
-    pairs = paired_table({"ferry": near}, GROUPS, CONFIG, 6.0, 1)
+    pairs = paired_table({"ferry": near}, GROUPS, CONFIG, 6.0, 1, Comparison("odisar"))
     table = detection_table({"ferry": near}, GROUPS, CONFIG, 6.0, 1, PUBLISHED_AS)
     cell = {"evaluated_on": "overall", "strength": 0.5, "protocol": "P2", "metric": "auroc"}
     difference = chosen(pairs, other="near", **cell).iloc[0]
@@ -129,7 +129,7 @@ def event_of(number, **delays):
 
 def test_less_delay_is_better_and_an_undetected_median_has_no_difference():
     items = [event_of(i, odisar=10 + i, quick=6 + i, slow=40 + 2 * i, never=None) for i in range(5)]
-    table = paired_table({"ferry": items}, GROUPS, CONFIG, 6.0, 1)
+    table = paired_table({"ferry": items}, GROUPS, CONFIG, 6.0, 1, Comparison("odisar"))
     delays = chosen(table, metric="delay_p50_s", evaluated_on="overall").set_index("other")
     assert delays.loc["quick", "difference"] == 4.0
     assert delays.loc["slow", "difference"] == 12.0 - 44.0
@@ -141,13 +141,13 @@ def test_less_delay_is_better_and_an_undetected_median_has_no_difference():
 def test_recordings_that_share_a_seed_give_a_difference_without_an_interval():
     items = [event_of(i, odisar=10, rmse=20) for i in range(3)]
     items = [replace(r, info=replace(r.info, base_seed="same")) for r in items]
-    table = paired_table({"ferry": items}, GROUPS, CONFIG, 6.0, 1)
+    table = paired_table({"ferry": items}, GROUPS, CONFIG, 6.0, 1, Comparison("odisar"))
     assert table["difference"].notna().any()
     assert table[["ci_low", "ci_high"]].isna().all(axis=None)
 
 
 def test_the_order_of_recordings_has_no_influence(paired, recordings):
-    again = paired_table({"ferry": recordings[::-1]}, GROUPS, CONFIG, 6.0, 1)
+    again = paired_table({"ferry": recordings[::-1]}, GROUPS, CONFIG, 6.0, 1, Comparison("odisar"))
     pd.testing.assert_frame_equal(paired, again)
 
 
