@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from itertools import product
 
 import pandas as pd
 
@@ -20,6 +21,10 @@ PUBLISHED_PROTOCOLS = ("P1", "P2")
 
 #: Published disturbances are those at this strength; recordings without a strength are taken as so.
 FULL_STRENGTH = 1.0
+
+#: Detectors beside which a published one stands. The paper's score is our ``reconstruction``; what
+#: it published as its monitor is also what our monitor is held against.
+_STAND_IN = {"odisar": ("odisar", "reconstruction")}
 
 _Key = tuple[str, str, str, str]
 
@@ -33,7 +38,8 @@ def _rows(name: str) -> list[dict[str, str]]:
 def published_values() -> Mapping[_Key, float]:
     """Return the published figures by (set-up, evaluated on, detector, metric), as fractions.
 
-    A set-up published on a single manoeuvre has no row for all data; its one row is that.
+    A set-up published on a single manoeuvre has no row for all data; its one row is that. The
+    published monitor stands beside two of our detectors.
     """
     rows = _rows("published.csv")
     scenarios: dict[str, set[str]] = {}
@@ -43,8 +49,9 @@ def published_values() -> Mapping[_Key, float]:
     for row in rows:
         names = [row["evaluated_on"]]
         names += [OVERALL] if len(scenarios[row["setup"]]) == 1 else []
-        for name in names:
-            values[row["setup"], name, row["detector"], row["metric"]] = float(row["value"])
+        detectors = _STAND_IN.get(row["detector"], (row["detector"],))
+        for name, detector in product(names, detectors):
+            values[row["setup"], name, detector, row["metric"]] = float(row["value"])
     return values
 
 

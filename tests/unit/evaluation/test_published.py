@@ -35,6 +35,15 @@ def test_published_figures_are_the_papers(key, value):
     assert published_values()[key] == value
 
 
+def test_the_papers_monitor_stands_beside_ours_and_beside_its_own_score():
+    values = published_values()
+    monitors = {key: value for key, value in values.items() if key[2] == "odisar"}
+    assert monitors
+    for (setup, name, _, metric), value in monitors.items():
+        assert values[setup, name, "reconstruction", metric] == value
+    assert {key[2] for key in values} == {"odisar", "reconstruction", "rmse"}
+
+
 def test_published_quadrants_are_ranges_with_the_papers_words():
     shares = published_shares()
     assert (shares["vessel-all", "red"].low, shares["vessel-all", "red"].high) == (0.0, 0.05)
