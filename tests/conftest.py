@@ -50,10 +50,10 @@ def trained_twin(
 def relative_twin(plan: TrainingPlan) -> TrainedTwin:
     """Return a twin of random weights that takes speed and turn rate for x and y of a pose.
 
-    Its heading is the command.
+    Its heading stands where others have the command.
     """
     pose = PoseChannels(x=1, y=2, heading=(0,), in_degrees=False)
-    spec = replace(SPEC, pose=pose)
+    spec = replace(SPEC, pose=pose, commands=())
     torch.manual_seed(5)
     train = [make_recording(f"train-{i}") for i in range(6)]
     scaler = Scaler.fit(train, spec)

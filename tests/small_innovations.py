@@ -1,23 +1,30 @@
 """Innovation scores of a twin of the small system, fitted on recordings it has not seen."""
 
-from odisar.capability.innovations import FloatArray, InnovationScore
-from odisar.capability.scoring import InnovationScores, RecordingScores, Scorer
+import numpy as np
+
+from odisar.capability.innovations import FloatArray, InnovationScore, InnovationSteps
+from odisar.capability.scoring import RECONSTRUCTION, InnovationScores, RecordingScores, Scorer
 from odisar.twin.bundle import TrainedTwin
 from small_system import make_recording
 
 #: The first score is known so many steps after the first forecast.
-MEAN_STEPS, SIZE_STEPS = 10, 5
+STEPS = InnovationSteps(mean=10, size=5, recent=3, recent_share=0.3)
 
 
 def fit_small_scores(twin: TrainedTwin) -> InnovationScores:
     """Return scores fitted on undisturbed recordings."""
     scorer = Scorer(twin, 64, "cpu")
-    scored = [
-        scorer.score(make_recording(f"held-out-{i}"), short_lead_steps=5) for i in range(4)
-    ]
+    scored = [scorer.score(make_recording(f"held-out-{i}"), short_lead_steps=5) for i in range(4)]
+    twin, closed, rebuilt = (
+        [run for scores in scored for run in runs_of(scores, values_of(scores))]
+        for values_of in (
+            lambda scores: scores.innovations,
+            lambda scores: scores.closed_form_innovations,
+            lambda scores: scores.scores[RECONSTRUCTION].astype(np.float64),
+        )
+    )
     return InnovationScores(
-        _fitted([runs_of(scores, scores.innovations) for scores in scored]),
-        _fitted([runs_of(scores, scores.closed_form_innovations) for scores in scored]),
+        InnovationScore.fit(twin, rebuilt, STEPS), InnovationScore.fit(closed, None, STEPS)
     )
 
 
@@ -26,11 +33,6 @@ def small_scorer(twin: TrainedTwin, batch: int = 64) -> Scorer:
     return Scorer(twin, batch, "cpu", fit_small_scores(twin))
 
 
-def runs_of(scores: RecordingScores, innovations: FloatArray) -> list[FloatArray]:
-    """Return the innovations of each gapless run from its first known one."""
-    return [innovations[start + 1 : stop] for start, stop in scores.runs]
-
-
-def _fitted(by_recording: list[list[FloatArray]]) -> InnovationScore:
-    runs = [run for own in by_recording for run in own]
-    return InnovationScore.fit(runs, mean_steps=MEAN_STEPS, size_steps=SIZE_STEPS)
+def runs_of(scores: RecordingScores, values: FloatArray) -> list[FloatArray]:
+    """Return (window, ...) values in gapless runs, from each one's first known innovation."""
+    return [values[start + 1 : stop] for start, stop in scores.runs]

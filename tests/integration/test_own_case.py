@@ -81,6 +81,7 @@ ROVER = {
         "sizes": {kind: [2.0] for kind in ("noise", "bias", "drift")},
         "sizes_in": "sd",
         "delays_s": [1.5],
+        "creep": None,
         "start_s": 20.0,
         "duration_s": {"low": 12.0, "high": 12.0},
         "shows_from_sd": 0.25,

@@ -184,7 +184,7 @@ def test_a_fault_leaves_everything_outside_its_interval_untouched(data, seed):
     faults = {
         "kinds": ["noise", "bias", "drift", "stuck", "delay"], "channels": ["y"],
         "sizes": {"noise": [0.5, 2.0], "bias": [0.5, 2.0], "drift": [0.5, 2.0]}, "sizes_in": "sd",
-        "delays_s": [1.3], "start_s": 1.5, "duration_s": {"low": 2.0, "high": 4.0},
+        "delays_s": [1.3], "creep": None, "start_s": 1.5, "duration_s": {"low": 2.0, "high": 4.0},
         "shows_from_sd": 0.25,
     }  # fmt: skip
     original = recording.values.tobytes()

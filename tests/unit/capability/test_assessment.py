@@ -24,7 +24,6 @@ from odisar.recordings.schema import Recording
 from small_innovations import small_scorer
 from small_system import make_recording
 
-
 LIMITS = Thresholds(score=4.0, reconstruction=0.1, variance=0.01)
 
 

@@ -132,7 +132,7 @@ def test_disjoint_windows_forecast_no_sample_twice_and_stay_inside_segments():
     info = RecordingInfo("system", disturbance="none", base_seed="0")
     segments = ((0, 60), (60, 100))
     recording = Recording("r", info, np.arange(100.0), np.zeros((100, 1)), segments=segments)
-    spec = WindowSpec(context_steps=10, horizon_steps=7, outputs=(0,), known_ahead=())
+    spec = WindowSpec(context_steps=10, horizon_steps=7, outputs=(0,), commands=(), known_ahead=())
     positions = disjoint_positions(recording, spec)
     forecast = (positions[:, None] + np.arange(1, 8)).ravel()
     assert len(np.unique(forecast)) == len(forecast)

@@ -104,6 +104,8 @@ def test_a_twin_in_relative_coordinates_is_deployed_with_its_pose(relative_twin,
     recording = pushed()
     said = read_bundle(folder).assess(table_of(recording, named=True))
     assert said.to_dict("records") == rows(expected(relative_twin, recording))
-    plain = write_small_bundle(tmp_path / "plain", relative_twin)
+    plain = write_small_bundle(
+        tmp_path / "plain", relative_twin, case=small_case(channels=channels)
+    )
     with pytest.raises(OdisarError, match="differ in pose"):
         read_bundle(plain)

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from odisar.capability.scoring import Scorer
 from odisar.config.judging import EvaluationConfig, Judging
 from odisar.deployment import development
 from odisar.deployment.development import judged_recordings, measure
@@ -16,6 +15,7 @@ from odisar.evaluation.protocols import take_samples
 from odisar.evaluation.scored import ScoredRecording
 from odisar.stages.bundle import measure_again
 from small_bundle import pushed, small_case, small_settings
+from small_innovations import small_scorer
 from small_system import make_recording
 
 JUDGING = EvaluationConfig.model_validate(
@@ -40,7 +40,7 @@ def recordings():
 
 @pytest.fixture(scope="module")
 def scorer(trained_twin):
-    return Scorer(trained_twin, 64, "cpu")
+    return small_scorer(trained_twin)
 
 
 def measured(scorer, recordings, stride_steps=1, case=None):
@@ -48,7 +48,7 @@ def measured(scorer, recordings, stride_steps=1, case=None):
     return measure(scorer, case, recordings, JUDGING, stride_steps=stride_steps, seed=3)
 
 
-def test_without_a_stride_it_is_the_auroc_of_protocol_p2(scorer, recordings):
+def test_without_a_stride_it_is_the_auroc_of_protocol_p2(scorer, recordings, trained_twin):
     scores, labels = [], []
     for item in recordings:
         said = scorer.score(item, short_lead_steps=3)

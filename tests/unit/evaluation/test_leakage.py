@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from odisar.baselines.interface import at_samples
-from odisar.capability.scoring import ODISAR, RMSE, Scorer
+from odisar.capability.scoring import CLOSED_FORM, ODISAR, RECONSTRUCTION, RMSE
 from odisar.errors import OdisarError
 from odisar.evaluation.leakage import ProbePlan, probe_leakage
 from odisar.evaluation.leakage_probes import PROBES, cut_after, score_changes
 from odisar.evaluation.leakage_report import LEAKAGE_COLUMNS, leakage_table
 from odisar.windows.coordinates import PoseChannels, features
 from odisar.windows.scaling import channel_std
+from small_innovations import small_scorer
 from small_system import make_recording
 
 STATES = (1, 2)
@@ -299,9 +300,9 @@ def test_recordings_with_gaps_and_a_relative_pose_are_probed(heading):
 
 
 @pytest.mark.parametrize("name", ["trained_twin", "relative_twin"])
-@pytest.mark.parametrize("detector", [ODISAR, RMSE])
+@pytest.mark.parametrize("detector", [ODISAR, CLOSED_FORM, RECONSTRUCTION, RMSE])
 def test_a_twins_scores_pass_but_for_rounding(request, name, detector):
-    scorer = Scorer(request.getfixturevalue(name), 32, "cpu")
+    scorer = small_scorer(request.getfixturevalue(name), 32)
 
     def score(recordings):
         scored = [scorer.score(recording, short_lead_steps=5) for recording in recordings]

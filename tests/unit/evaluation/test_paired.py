@@ -5,12 +5,7 @@ import pandas as pd
 import pytest
 
 from odisar.errors import OdisarError
-from odisar.evaluation.paired import (
-    PAIRED_COLUMNS,
-    Comparison,
-    paired_table,
-    seed_spread_table,
-)
+from odisar.evaluation.paired import PAIRED_COLUMNS, Comparison, paired_table, seed_spread_table
 from odisar.evaluation.protocols import PROTOCOLS
 from odisar.evaluation.tables import detection_table
 

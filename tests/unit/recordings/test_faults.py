@@ -11,6 +11,7 @@ FAULTS = {
     "sizes": {"noise": [2.0], "bias": [2.0], "drift": [2.0]},
     "sizes_in": "sd",
     "delays_s": [3.0],
+    "creep": None,
     "start_s": 10.0,
     "duration_s": {"low": 20.0, "high": 20.0},
     "shows_from_sd": 0.25,
@@ -42,6 +43,9 @@ def test_each_fault_gives_a_copy_that_says_what_it_is(copies):
         assert copy.info.maneuver == "turning"
         assert copy.info.split == "test"
         assert copy.info.extra["fault_channel"] == "Speed"
+        fault = f"{copy.info.disturbance} {copy.info.column('fault_size')}".strip()
+        assert copy.info.extra["fault"] == fault
+        assert copy.info.extra["fault_on"] == f"{fault}, Speed"
 
 
 def test_the_interval_fits_and_outside_it_nothing_changes(copies):
@@ -96,6 +100,26 @@ def test_sizes_in_the_channel_s_unit_take_no_account_of_its_spread(make_case, ma
         "stuck": "",
         "delay": "3 s",
     }
+
+
+def test_creep_grows_at_its_rate_from_its_start(make_case, make_recording):
+    recording = make_recording("turn", 60)
+    creep = {"channels": ["Speed"], "rates": [0.03, 0.1]}
+    case = make_case(faults=FAULTS | {"kinds": [], "creep": creep})
+    slow, fast = inject_faults([recording], case, STD, 7)
+    for copy, rate, size in ((slow, 0.03, "0.03 m/s/s"), (fast, 0.1, "0.1 m/s/s")):
+        inside = label_times(recording.time_s, copy.intervals)
+        grown = copy.values[inside, 1] - recording.values[inside, 1]
+        np.testing.assert_allclose(grown, rate * np.arange(20), atol=1e-12)
+        np.testing.assert_array_equal(copy.values[~inside], recording.values[~inside])
+        assert (copy.info.disturbance, copy.info.column("fault_size")) == ("creep", size)
+    assert len({slow.name, fast.name}) == 2
+
+
+def test_a_channel_that_creeps_must_exist(make_case):
+    creep = {"channels": ["Sped"], "rates": [0.03]}
+    with pytest.raises(ValueError, match="Sped"):
+        make_case(faults=FAULTS | {"creep": creep})
 
 
 def test_whether_a_fault_shows_is_judged_in_standard_deviations(make_case, make_recording):

@@ -8,7 +8,7 @@ import pytest
 
 from odisar.errors import OdisarError
 from odisar.stages.bundle import _example, _inputs_key, _settings, measure_again
-from small_bundle import small_case
+from small_bundle import small_case, small_settings
 from small_system import make_recording
 
 
@@ -16,23 +16,23 @@ def test_the_example_is_the_first_stretch_that_would_be_accepted():
     recording = make_recording("calibration", 120)
     values = recording.values.copy()
     values[:35, 1] = 0.5  # a state that does not change for a whole window
-    example = _example([replace(recording, values=values)], "system", small_case())
-    assert len(example.data) == 31
+    example = _example([replace(recording, values=values)], "system", small_case(), 11)
+    assert len(example.data) == 41
     assert example.data[0][0] == 10.0
-    np.testing.assert_array_equal(np.array(example.data)[:, 1:], values[10:41])
+    np.testing.assert_array_equal(np.array(example.data)[:, 1:], values[10:51])
 
 
 def test_no_example_reaches_over_a_gap():
-    recording = make_recording("calibration", 60)
+    recording = make_recording("calibration", 70)
     time_s = recording.time_s + np.where(recording.time_s >= 25, 100.0, 0.0)
-    cut = replace(recording, time_s=time_s, segments=((0, 25), (25, 60)))
-    assert _example([cut], "system", small_case()).data[0][0] == 125.0
+    cut = replace(recording, time_s=time_s, segments=((0, 25), (25, 70)))
+    assert _example([cut], "system", small_case(), 11).data[0][0] == 125.0
 
 
 def test_recordings_without_a_sound_stretch_are_refused():
     still = replace(make_recording("still", 60), values=np.ones((60, 3)))
     with pytest.raises(OdisarError, match="add calibration recordings"):
-        _example([still], "system", small_case())
+        _example([still], "system", small_case(), 11)
 
 
 def test_the_key_names_what_went_in(tmp_path):
@@ -55,13 +55,14 @@ def test_a_champion_of_other_channels_is_not_measured():
         measure_again(config, None, "small", then)
 
 
-def test_a_threshold_that_flags_everything_is_not_deployed():
+def test_a_threshold_that_flags_everything_is_not_deployed(trained_twin):
     config = SimpleNamespace(
         capability=SimpleNamespace(threshold_sigmas=3.0, attribution_top=3, scoring_batch=8),
         registry=SimpleNamespace(max_rows=10),
     )
     limits = {
-        "thresholds": {"reconstruction": 1.0, "variance": 1.0},
+        "innovation": small_settings(trained_twin).innovation.model_dump(),
+        "thresholds": {"score": 1.0, "reconstruction": 1.0, "variance": 1.0},
         "sigma": {"odisar": 1.0},
         "operating": {"odisar": 0.0},
         "operating_pooled": 0,

@@ -51,7 +51,7 @@ def asked_of(positions, scores):
     unknown = np.zeros((len(positions), 1))
     runs = ((0, len(positions)),)
     known = RecordingScores(positions, scores, unknown, unknown, unknown, runs)
-    return SimpleNamespace(score=lambda _, *, short_lead_steps: known)
+    return SimpleNamespace(score=lambda *_, **__: known)
 
 
 def test_range_rules_and_alternatives_stand_beside_the_twins_scores_at_the_same_times(request):
@@ -111,9 +111,12 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     data, trained_twin
 ):
     scorer = Scorer(trained_twin, 64, "cpu")
-    config = InnovationConfig(mean_steps=7, size_steps=3)
+    config = InnovationConfig(mean_steps=7, size_steps=3, recent_steps=2, recent_share=0.2)
     fitted = fit_innovation_scores(scorer, data, config)
     assert (fitted.twin.mean.steps, fitted.closed_form.size.steps) == (7, 3)
+    assert (fitted.twin.recent.steps, fitted.closed_form.recent_share) == (2, 0.2)
+    assert fitted.twin.reconstruction is not None
+    assert fitted.closed_form.reconstruction is None
     validation = [
         scorer.score(item, short_lead_steps=3).innovations[1:] for item in data.splits["validation"]
     ]

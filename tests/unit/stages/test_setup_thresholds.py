@@ -3,17 +3,35 @@ import dataclasses
 import numpy as np
 import pytest
 
-from odisar.capability.assessment import Thresholds
+from odisar.capability.distribution import NoiseFloor
+from odisar.capability.innovation_values import InnovationScoreValues
+from odisar.capability.innovations import InnovationScore, InnovationSteps
+from odisar.capability.recalibration import Recalibration
+from odisar.capability.scoring import InnovationScores
 from odisar.config.loader import ConfigView, load_config
 from odisar.evaluation.alarms import calibrate_operating_threshold
 from odisar.stages.calibrate import PARAMS, MemberCalibration, setup_thresholds
+from odisar.stages.distributions import Distributions
 
 SETUP = "vessel-all"
+RULES = ("sigma", "log-sigma", "operating", "conformal")
+
+
+def read_config(root, rule="sigma"):
+    whole = load_config(root)
+    capability = whole.capability.model_copy(update={"threshold_rule": rule})
+    return ConfigView(whole.model_copy(update={"capability": capability}), PARAMS)
 
 
 @pytest.fixture(scope="module")
 def config(request):
-    return ConfigView(load_config(request.config.rootpath), PARAMS)
+    return read_config(request.config.rootpath)
+
+
+def innovation_values() -> InnovationScoreValues:
+    runs = [np.random.default_rng(0).normal(size=(50, 2))]
+    score = InnovationScore.fit(runs, None, InnovationSteps(3, 2, 1, 0.3))
+    return InnovationScoreValues.of(InnovationScores(score, score))
 
 
 def calibration(number: int, *, hours: float, sigma: float = 1.0) -> MemberCalibration:
@@ -23,9 +41,14 @@ def calibration(number: int, *, hours: float, sigma: float = 1.0) -> MemberCalib
     """
     scores = sigma * np.abs(np.random.default_rng(number).normal(size=2000))
     return MemberCalibration(
-        runs={"odisar": [(f"block-{number}", scores)]},
-        sigma={"odisar": sigma},
-        thresholds=Thresholds(sigma, 0.1),
+        innovation=innovation_values(),
+        runs={name: [(f"block-{number}", scores)] for name in ("odisar", "reconstruction")},
+        sigma={"odisar": sigma, "reconstruction": 2 * sigma},
+        log_sigma={"odisar": 1.1 * sigma, "reconstruction": 2.2 * sigma},
+        variance=0.1,
+        distributions=Distributions(
+            NoiseFloor(np.ones((1, 5)), 10), Recalibration(((),), horizon_steps=1, windows=10)
+        ),
         state_low=[float(i) for i in range(5)],
         state_high=[float(i) + 10 for i in range(5)],
         hours=hours,
@@ -52,7 +75,9 @@ def test_a_single_member_keeps_to_its_own_recordings(config):
     assert content["operating_hours"] == content["calibration_hours"] == 0.5
     wanted = 3.0 * operating_threshold(config, only)
     assert content["operating"]["odisar"] == pytest.approx(wanted)
-    assert content["thresholds"] == {"reconstruction": 3.0, "variance": 0.1}
+    assert content["thresholds"] == {"score": 3.0, "reconstruction": 6.0, "variance": 0.1}
+    assert content["log_sigma"] == only.log_sigma
+    assert InnovationScoreValues.model_validate(content["innovation"]) == only.innovation
     assert content["state_high"]["Roll Rate"] == 14.0
 
 
@@ -74,8 +99,11 @@ def test_folds_are_pooled_in_units_of_their_own_thresholds(config):
     louder = {
         name: dataclasses.replace(
             fold,
-            runs={"odisar": [(block, 50 * scores) for block, scores in fold.runs["odisar"]]},
-            sigma={"odisar": 50.0},
+            runs={
+                name: [(block, 50 * scores) for block, scores in runs]
+                for name, runs in fold.runs.items()
+            },
+            sigma={"odisar": 50.0, "reconstruction": 100.0},
         )
         if name == "fold-2"
         else fold
@@ -94,3 +122,21 @@ def test_members_with_hours_enough_are_not_pooled(config):
     assert {one["operating_pooled"] for one in content.values()} == {0}
     alone = operating_threshold(config, folds["fold-1"])
     assert content["fold-1"]["operating"]["odisar"] == pytest.approx(alone)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_the_rule_that_is_asked_for_sets_the_threshold_of_the_score_alone(request, rule):
+    config = read_config(request.config.rootpath, rule)
+    only = calibration(1, hours=30.0, sigma=3.0)
+    content = setup_thresholds(config, SETUP, {SETUP: only})[SETUP]
+    by_rule = {name: content[name.replace("-", "_")]["odisar"] for name in RULES}
+    assert content["thresholds"]["score"] == by_rule[rule]
+    assert len(set(by_rule.values())) == len(RULES)
+    assert content["thresholds"]["reconstruction"] == 6.0
+
+
+def test_the_conformal_threshold_comes_with_its_promise(config):
+    only = calibration(1, hours=30.0, sigma=3.0)
+    content = setup_thresholds(config, SETUP, {SETUP: only})[SETUP]
+    assert "of fresh blocks" in content["promise"]
+    assert set(content["promised_per_hour"]) == {"odisar", "reconstruction"}
