@@ -112,6 +112,8 @@ class _Description(Section):
         ):
             if len(set(positions)) < len(positions) or any(i >= channels for i in positions):
                 raise ValueError(f"spec.{what}={list(positions)} are not among {channels} channels")
+        if set(spec.commands) & set(pose):
+            raise ValueError(f"spec.commands={list(spec.commands)}: a channel of the pose is none")
         for steps in ("context_steps", "horizon_steps"):
             if getattr(spec, steps) % self.config.patch_steps:
                 raise ValueError(f"spec.{steps} is no multiple of config.patch_steps")

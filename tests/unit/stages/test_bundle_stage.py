@@ -15,7 +15,7 @@ from small_system import make_recording
 def test_the_example_is_the_first_stretch_that_would_be_accepted():
     recording = make_recording("calibration", 120)
     values = recording.values.copy()
-    values[:35, 1] = 0.5  # a state that does not change for a whole window
+    values[:45, 1] = 0.5  # a state that does not change for a whole example
     example = _example([replace(recording, values=values)], "system", small_case(), 11)
     assert len(example.data) == 41
     assert example.data[0][0] == 10.0
