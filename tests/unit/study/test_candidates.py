@@ -1,0 +1,115 @@
+"""The rule that chose the score: means of means, and candidates that are what their names say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from odisar.capability.scoring import Scorer
+from odisar.stages.members import MemberData
+from odisar.study.development import candidates, fit_statistics, ranked
+from small_bundle import small_case
+from small_system import make_recording
+
+MEAN, SIZE, REBUILT = "T2 of mean over 10", "log NIS over 5", "reconstruction"
+RECENT = "T2 of mean over 3"
+
+
+def judged(*rows):
+    """Return a table of (candidate, set-up, AUROC, TNR@TPR95)."""
+    return pd.DataFrame(rows, columns=["candidate", "setup", "auroc", "tnr_at_tpr95"])
+
+
+def test_the_mean_is_over_set_ups_of_the_mean_over_cells():
+    table = ranked(
+        judged(
+            ("wide", "x", 0.8, 0.6),
+            ("wide", "x", 1.0, 0.8),
+            ("wide", "y", 0.5, 0.3),
+            ("even", "x", 0.6, 0.4),
+            ("even", "x", 0.6, 0.4),
+            ("even", "y", 0.9, 0.7),
+        )
+    )
+    # Over cells alone, `wide` would have .67 and `even` .6.
+    means = table.groupby("candidate").rule_mean.first()
+    assert means["wide"] == pytest.approx((0.8 + 0.4) / 2)
+    assert means["even"] == pytest.approx((0.5 + 0.8) / 2)
+    assert table["rank"].tolist() == [2, 2, 2, 1, 1, 1]
+    assert table.candidate.tolist() == ["wide"] * 3 + ["even"] * 3
+
+
+@pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])
+def test_of_equals_the_first_in_the_table_comes_first(names):
+    rows = [(name, "x", 1.0 if name == "c" else 0.5, 0.5) for name in names]
+    place = ranked(judged(*rows)).set_index("candidate")["rank"]
+    others = [name for name in names if name != "c"]
+    assert place["c"] == 1
+    assert [place[name] for name in others] == [2, 3, 4]
+
+
+def invented():
+    """Return a constant for the statistic of every candidate that is one."""
+    singles = [one.name for one in candidates() if one.parts == 1]
+    return {name: np.full(3, float(number)) for number, name in enumerate(singles)}
+
+
+def test_a_single_statistic_is_a_candidate_as_it_is():
+    statistics = invented()
+    for one in candidates():
+        if one.parts == 1:
+            np.testing.assert_array_equal(one.of(statistics), statistics[one.name])
+
+
+@pytest.mark.parametrize(
+    ("name", "parts", "expected"),
+    [
+        ("larger of mean and size", 2, [3, 5, 2]),
+        ("largest of mean, size, reconstruction", 3, [3, 5, 9]),
+        ("largest of three, and recent (.7, .3)", 4, [5.1, 6.5, 9.3]),
+        ("largest of three, and recent (.5, .5)", 4, [6.5, 7.5, 9.5]),
+    ],
+)
+def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
+    statistics = invented() | {
+        MEAN: np.array([1.0, 5.0, 2.0]),
+        SIZE: np.array([3.0, 1.0, 1.0]),
+        REBUILT: np.array([2.0, 2.0, 9.0]),
+        RECENT: np.full(3, 10.0),
+    }
+    one = next(one for one in candidates() if one.name == name)
+    assert one.parts == parts
+    np.testing.assert_allclose(one.of(statistics), expected)
+
+
+def test_no_two_candidates_have_a_name():
+    names = [one.name for one in candidates()]
+    assert len(set(names)) == len(names)
+
+
+def test_what_is_not_known_yet_leaves_the_whole_unknown():
+    statistics = invented() | {RECENT: np.array([np.nan, 1.0, 1.0])}
+    whole = next(one for one in candidates() if one.parts == 4).of(statistics)
+    np.testing.assert_array_equal(np.isnan(whole), [True, False, False])
+
+
+def test_every_statistic_is_made_and_none_knows_what_comes_later(relative_twin):
+    splits = {"train": [make_recording("train-0")]}
+    data = MemberData(small_case(), splits, relative_twin.scaler, relative_twin.spec)
+    scorer = Scorer(relative_twin, 64, "cpu")
+
+    def score(item):
+        return item, scorer.score(item, short_lead_steps=3)
+
+    held_out = [score(make_recording(f"held-out-{i}", 200)) for i in range(2)]
+    makers = fit_statistics(data, scorer, held_out)
+    assert set(makers) == {one.name for one in candidates() if one.parts == 1}
+    whole = make_recording("test", 120)
+    ended = replace(whole, time_s=whole.time_s[:80], values=whole.values[:80], segments=())
+    for name, make in makers.items():
+        long, short = make(*score(whole)), make(*score(ended))
+        known = np.isfinite(short)
+        # 21 samples before the first forecast of a sample, and at most 20 that are averaged.
+        assert known[41:].all(), name
+        np.testing.assert_allclose(long[: len(short)], short, atol=1e-3, err_msg=name)
