@@ -1,12 +1,13 @@
 """The runner refuses what can't be run in a sentence, and hands a part what it declared."""
 
-import shutil
 import sys
 from types import SimpleNamespace
 
 import pytest
 
+from odisar.config.loader import load_config
 from odisar.errors import OdisarError
+from odisar.study import runner
 from odisar.study.runner import PARTS, run_part
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -19,10 +20,16 @@ def _threads(monkeypatch):
         monkeypatch.setenv(name, "1")
 
 
+@pytest.fixture(scope="module")
+def config(request):
+    """Return the shipped parameters, read once."""
+    return load_config(request.config.rootpath)
+
+
 @pytest.fixture
-def workspace(tmp_path, request):
+def workspace(tmp_path, monkeypatch, config):
     """Return a folder with the shipped parameters, in which nothing has been run."""
-    shutil.copy(request.config.rootpath / "params.yaml", tmp_path)
+    monkeypatch.setattr(runner, "load_config", {tmp_path: config}.__getitem__)
     return tmp_path
 
 
