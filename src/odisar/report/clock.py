@@ -39,8 +39,12 @@ class Clock:
 
 def clock(start_s: float, shown_s: float) -> Clock:
     """Return the clock of a recording that begins at ``start_s``, of which so much is shown."""
-    unit, unit_s = ("s", 1.0) if shown_s < _MINUTES_FROM_S else ("min", 60.0)
-    return Clock(start_s, unit, unit_s)
+    return Clock(start_s, *span_unit(shown_s))
+
+
+def span_unit(shown_s: float) -> tuple[str, float]:
+    """Return the unit in which so long a time axis is told, and its seconds."""
+    return ("s", 1.0) if shown_s < _MINUTES_FROM_S else ("min", 60.0)
 
 
 def trace_of(results: Results, case: str, recording: str) -> pd.DataFrame:

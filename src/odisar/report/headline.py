@@ -4,6 +4,10 @@ from typing import Any
 
 import pandas as pd
 
+from odisar.report.detectors import ORACLE
+from odisar.report.load import OVERALL
+from odisar.report.picking import shown_detectors
+
 #: Metric in ``detection.csv``, heading, whether it is a share shown in percent.
 _COLUMNS = (
     ("auroc", "AUROC %", True),
@@ -16,16 +20,21 @@ _COLUMNS = (
 )
 
 
-def headline_table(detection: pd.DataFrame, protocol: str = "P2") -> pd.DataFrame:
+def headline_table(
+    detection: pd.DataFrame, protocol: str = "P2", *, every_detector: bool = False
+) -> pd.DataFrame:
     """Return set-up, strength, detector and the headline metrics with their intervals, as text.
 
-    ``detection`` is ``reports/results/detection.csv``; rows are its overall ones. False alarms do
-    not depend on a strength, so they stand in every row of their set-up and detector.
+    ``detection`` is ``reports/results/detection.csv``; rows are its overall ones, of the twin's
+    scores and of the best cheap alternative unless ``every_detector`` is asked for. False alarms
+    do not depend on a strength, so they stand in every row of their set-up and detector.
     """
-    chosen = detection[(detection.protocol == protocol) & (detection.evaluated_on == "overall")]
-    chosen = chosen[chosen.detector != "oracle"]
+    chosen = detection[(detection.protocol == protocol) & (detection.evaluated_on == OVERALL)]
+    chosen = chosen[chosen.detector != ORACLE]
     rows = []
     for (setup, detector), group in chosen.groupby(["setup", "detector"], sort=False):
+        if not every_detector and detector not in shown_detectors(detection, str(setup)):
+            continue
         alarms = group[group.metric == "false_alarms_per_hour"]
         judged = group[group.metric != "false_alarms_per_hour"]
         # Without a disturbed test recording there are still false alarms to tell.
@@ -43,7 +52,10 @@ def headline_table(detection: pd.DataFrame, protocol: str = "P2") -> pd.DataFram
 
 def headline_text(detection: pd.DataFrame) -> str:
     """Return the headline table for a terminal."""
-    title = "Protocol P2 (the score at t against 'disturbed at t'), 95 % intervals in brackets"
+    title = (
+        "Protocol P2 (the score at t against 'disturbed at t'), 95 % intervals in brackets; of the "
+        "cheap\nalternatives the best one (all are in reports/results/detection.csv)"
+    )
     return f"{title}\n{headline_table(detection).to_string(index=False)}"
 
 

@@ -11,9 +11,11 @@ import pandas as pd
 
 from odisar.artifacts import Workspace, read_json, read_table
 from odisar.config.cases import Case
+from odisar.config.judging import Judging
 from odisar.config.loader import PARAMS_FILE, ConfigView, load_config
 from odisar.errors import OdisarError
 from odisar.recordings.quality import read_quality_table
+from odisar.report.detectors import ORACLE
 from odisar.report.ordering import ordered_values
 
 #: Sections of ``params.yaml`` that the report and its notebooks read.
@@ -37,6 +39,11 @@ OVERALL = "overall"
 def report_folder(root: Path) -> Path:
     """Return where the report stage keeps what is not committed."""
     return root / "build/report"
+
+
+def study_folder(root: Path) -> Path:
+    """Return where the full study puts its tables; the default run has none."""
+    return root / "reports/study"
 
 
 def find_root(start: Path) -> Path:
@@ -103,6 +110,10 @@ class Results:
         case: Case = self.config.case_of(setup)
         return case
 
+    def judging(self, setup: str) -> Judging:
+        """Return how a set-up is judged."""
+        return Judging.of(self.config.evaluation, self.case_of(setup))
+
     def setups_of(self, case: str) -> list[str]:
         """Return the set-ups of a case."""
         return [setup for setup in self.setups if self.config.setups[setup].case == case]
@@ -110,27 +121,65 @@ class Results:
     @cached_property
     def detection(self) -> pd.DataFrame:
         """Detection and operating metrics with intervals (``detection.csv``)."""
-        return read_table(self.workspace.results / "detection.csv")
+        return self._result("detection")
 
     @cached_property
     def operating(self) -> pd.DataFrame:
         """Hours and events behind the operating metrics."""
-        return read_table(self.workspace.results / "operating.csv")
+        return self._result("operating")
+
+    @cached_property
+    def paired(self) -> pd.DataFrame:
+        """What the monitor has over every other detector, with paired intervals."""
+        return self._result("paired")
+
+    @cached_property
+    def rules(self) -> pd.DataFrame:
+        """What every rule for a threshold promised and gave (``thresholds.csv``)."""
+        return self._result("thresholds")
 
     @cached_property
     def quadrants(self) -> pd.DataFrame:
         """Shares of the four quadrants."""
-        return read_table(self.workspace.results / "quadrants.csv")
+        return self._result("quadrants")
 
     @cached_property
     def attribution(self) -> pd.DataFrame:
         """How often each state comes first, and among the first three."""
-        return read_table(self.workspace.results / "attribution.csv")
+        return self._result("attribution")
+
+    @cached_property
+    def blame(self) -> pd.DataFrame:
+        """How often the channel that a fault was put on is named."""
+        return self._result("blame")
+
+    @cached_property
+    def reliability(self) -> pd.DataFrame:
+        """Coverage, sharpness and CRPS of the predictive distributions."""
+        return self._result("reliability")
+
+    @cached_property
+    def reliability_curves(self) -> pd.DataFrame:
+        """How often truths lie below each quantile of the predictive distributions."""
+        return self._result("reliability-curves")
+
+    @cached_property
+    def leakage(self) -> pd.DataFrame:
+        """What the leakage probes found about every detector of every twin."""
+        return self._result("leakage")
 
     @cached_property
     def nearness(self) -> pd.DataFrame:
         """Distances of windows to their nearest training window."""
-        return read_table(self.workspace.results / "nearness.csv")
+        return self._result("nearness")
+
+    def study(self, name: str) -> pd.DataFrame | None:
+        """Return a table of the study, or None where the study has not made it."""
+        path = study_folder(self.workspace.root) / f"{name}.csv"
+        return read_table(path) if path.is_file() else None
+
+    def _result(self, name: str) -> pd.DataFrame:
+        return read_table(self.workspace.results / f"{name}.csv")
 
     @cached_property
     def splits(self) -> pd.DataFrame:
@@ -160,7 +209,7 @@ class Results:
     def assessments(self, setup: str) -> pd.DataFrame:
         """Return one row for each assessed window of the test recordings, with its member.
 
-        ``error_ratio`` and ``variance_ratio`` are multiples of the member's thresholds,
+        ``score_ratio`` and ``variance_ratio`` are multiples of the member's thresholds,
         ``is_disturbed`` whether a disturbance was active when the window was assessed.
         """
         path = self.workspace.assessments(setup)
@@ -170,9 +219,7 @@ class Results:
         table = table.merge(known, on="recording", how="left", validate="many_to_one")
         limits = self.limits(setup)
         thresholds = table.member.map(lambda name: limits[name]["thresholds"])
-        table["error_ratio"] = table.reconstruction_error / thresholds.map(
-            lambda given: given["reconstruction"]
-        )
+        table["score_ratio"] = table.score / thresholds.map(lambda given: given["score"])
         table["variance_ratio"] = table.uncertainty_variance / thresholds.map(
             lambda given: given["variance"]
         )
@@ -200,7 +247,7 @@ class Results:
     def detectors(self, setup: str) -> list[str]:
         """Return a set-up's detectors in the order of the table, without the oracle."""
         rows = self.detection[self.detection.setup == setup]
-        return [name for name in rows.detector.unique() if name != "oracle"]
+        return [name for name in rows.detector.unique() if name != ORACLE]
 
     def strengths(self, setup: str, evaluated_on: str = OVERALL) -> list[float]:
         """Return the strengths at which something was detected, weakest first.

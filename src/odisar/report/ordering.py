@@ -22,14 +22,14 @@ def ordered_values(recordings: pd.DataFrame, column: str) -> list[str]:
         return []
     values = set(recordings[column].dropna().astype(str))
     if column in ("fault", "fault_on"):
-        return sorted(values, key=_fault_key)
+        return sorted(values, key=fault_key)
     if column != "fault_size":
         return sorted(values)
     kinds = recordings.groupby("fault_size").disturbance.min()
     return sorted(values, key=lambda size: (kinds[size], *size_key(size)))
 
 
-def _fault_key(fault: str) -> tuple[str, float, str]:
+def fault_key(fault: str) -> tuple[str, float, str]:
     """Return what to order "noise 0.1 m/s, Speed" by: kind, size, the rest."""
     kind, _, size = fault.partition(" ")
     return kind, *size_key(size)

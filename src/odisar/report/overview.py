@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from odisar.report.detectors import MONITOR
 from odisar.report.load import Results, rows_of
 from odisar.report.tables import Table, frame_table, number
 
@@ -72,28 +73,34 @@ def thresholds(results: Results) -> Table:
             lines.append(
                 [
                     member,
+                    number(limits["thresholds"]["score"]),
+                    number(limits["operating"][MONITOR]),
                     number(limits["thresholds"]["reconstruction"]),
                     number(limits["thresholds"]["variance"]),
-                    number(limits["operating"]["odisar"]),
                     f"{limits['calibration_hours']:.2f}",
                     f"{limits['operating_hours']:.2f}{pooled}",
                 ]
             )
     heads = [
         "twin",
+        "score",
+        "alarm",
         "reconstruction",
         "variance",
-        "alarm",
         "calibration hours",
         "hours behind the alarm threshold",
     ]
-    sigmas = results.config.capability.threshold_sigmas
-    note = f"Scaled units; mean + {sigmas:g} standard deviations on calibration recordings."
+    capability = results.config.capability
+    note = (
+        f"The score's by the rule {capability.threshold_rule!r}, reconstruction and variance (in "
+        f"scaled units) at mean + {capability.threshold_sigmas:g} standard deviations, all on "
+        "calibration recordings. A score of 1 is usual on validation recordings."
+    )
     return Table("Thresholds", heads, lines, note)
 
 
 def training(results: Results) -> Table:
-    """Return how many windows each twin has seen, and its best validation error."""
+    """Return how many windows each twin has seen, and its best validation loss."""
     lines = []
     for member, summary in results.training.items():
         seen, available = summary["windows_seen"], summary["training_windows"]
@@ -113,7 +120,7 @@ def training(results: Results) -> Table:
         "different windows",
         "passes over them",
         "epochs",
-        "best validation forecast error [scaled units squared]",
+        "best validation loss (both forecasts)",
     ]
     return Table("Windows seen in training", heads, lines)
 

@@ -10,10 +10,12 @@ import jinja2
 from markupsafe import Markup
 from pygments.formatters import HtmlFormatter  # type: ignore[import-untyped]
 
-from odisar.report import overview, tables
-from odisar.report.gallery import Drawn
+from odisar.report import answers, overview, tables
+from odisar.report.exhibits import Drawn
+from odisar.report.figures.blame import has_blame
 from odisar.report.load import Results
 from odisar.report.notebooks import notebook_html, notebook_title
+from odisar.report.study import missing_study, study_tables
 from odisar.report.summary import summarise
 from odisar.report.tables import Table
 
@@ -49,7 +51,6 @@ def render_body(
     plausibility: Sequence[Table],
 ) -> str:
     """Return everything of the report that follows from results alone, as an HTML fragment."""
-    setups = results.setups
     return (
         _templates()
         .get_template("body.html.j2")
@@ -57,19 +58,17 @@ def render_body(
             title=results.config.report.title,
             cases=[results.config.cases[name].title for name in results.cases],
             summary=summarise(results),
-            headline=tables.headline(results),
-            operating=tables.operating(results),
-            scenarios=[t for setup in setups for t in tables.scenario_tables(results, setup)],
-            paper_protocol=[tables.paper_protocol(results, setup) for setup in setups],
-            quadrants=[tables.quadrants(results, setup) for setup in setups],
+            answers=_answers(results),
             overview=[overview.splits(results), overview.nearness(results)],
             quality=overview.quality(results),
             learning=[
                 overview.training(results),
                 overview.thresholds(results),
-                *(tables.parameters(results, setup) for setup in setups),
+                *(tables.parameters(results, setup) for setup in results.setups),
             ],
             figures=figures,
+            study=study_tables(results),
+            missing_study=missing_study(results),
             plausibility=plausibility,
             notebooks=[
                 {"title": notebook_title(path), "html": Markup(notebook_html(path))}  # noqa: S704
@@ -77,6 +76,32 @@ def render_body(
             ],
         )
     )
+
+
+def _answers(results: Results) -> dict[str, list[Table]]:
+    """Return the tables of each section of figures, in the paper's order of questions."""
+    setups = results.setups
+    return {
+        "effectiveness": [
+            tables.headline(results),
+            tables.headline(results, every_detector=True),
+            tables.operating(results),
+            *(answers.effectiveness(results, setup) for setup in setups),
+            *(table for setup in setups for table in answers.rules(results, setup)),
+            *(table for setup in setups for table in tables.scenario_tables(results, setup)),
+        ],
+        "confidence": [
+            *(table for setup in setups for table in answers.reliability(results, setup)),
+            *(tables.quadrants(results, setup) for setup in setups),
+        ],
+        "alternatives": [
+            *(answers.against_forecast_errors(results, setup) for setup in setups),
+            *(answers.pairs(results, setup) for setup in setups),
+            *(answers.leakage(results, setup) for setup in setups),
+        ],
+        "protocols": [tables.paper_protocol(results, setup) for setup in setups],
+        "events": [answers.blame(results, setup) for setup in setups if has_blame(results, setup)],
+    }
 
 
 def render_page(

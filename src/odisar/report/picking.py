@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from odisar.report.detectors import TWIN_SCORES, alternatives
 from odisar.report.load import OVERALL, Results
 from odisar.report.style import strength_name
-
-#: The detector that the project is about.
-MONITOR = "odisar"
 
 
 @dataclass(frozen=True)
@@ -44,13 +42,38 @@ def pick(
     ]
     if metric != "false_alarms_per_hour":
         at = results.strengths(setup)[-1] if strength is None else strength
-        rows = rows[rows.strength.isna() if pd.isna(at) else rows.strength == at]
+        rows = same_strength(rows, at)
     rows = rows[rows.value.notna()]
     if rows.empty:
         return None
     return Value(
         *(float(rows[name].iloc[0]) for name in ("value", "ci_low", "ci_high", "published"))
     )
+
+
+def best_alternative(detection: pd.DataFrame, setup: str) -> str | None:
+    """Return the cheap alternative with the highest mean AUROC over strengths (P2, overall).
+
+    It is the best on the very recordings that it is shown on, so it looks a little better than it
+    is. None where there is no alternative with a value.
+    """
+    rows = detection[(detection.setup == setup) & (detection.evaluated_on == OVERALL)]
+    rows = rows[(rows.metric == "auroc") & (rows.protocol == "P2")]
+    rows = rows[rows.detector.isin(alternatives(list(rows.detector.unique())))]
+    means = rows.groupby("detector", sort=False).value.mean().dropna()
+    return None if means.empty else str(means.idxmax())
+
+
+def shown_detectors(detection: pd.DataFrame, setup: str) -> list[str]:
+    """Return what fits in one figure: the twin's scores and the best of the cheap alternatives."""
+    there = set(detection[detection.setup == setup].detector)
+    best = best_alternative(detection, setup)
+    return [name for name in TWIN_SCORES if name in there] + ([best] if best else [])
+
+
+def same_strength(rows: pd.DataFrame, strength: float) -> pd.DataFrame:
+    """Return the rows of a table at one strength; NaN is that of recordings without one."""
+    return rows[rows.strength.isna() if pd.isna(strength) else rows.strength == strength]
 
 
 def selection(results: Results, setup: str) -> str:

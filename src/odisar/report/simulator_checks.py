@@ -12,8 +12,8 @@ import pandas as pd
 from odisar.config.simulators import Simulator, SimulatorsConfig
 from odisar.config.sources import PinnedFile
 from odisar.report import overview
+from odisar.report.exhibits import Drawn
 from odisar.report.figures.simulator import office_map, sea_trial, standard_trials
-from odisar.report.gallery import Drawn
 from odisar.report.page import SeaTrial
 from odisar.report.style import save_figure
 from odisar.report.tables import Table

@@ -1,7 +1,7 @@
 """How every figure looks, and how it becomes the same bytes each time."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,9 +10,11 @@ import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import seaborn as sns
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 from numpy.typing import NDArray
 
@@ -34,19 +36,6 @@ QUADRANT_COLOURS = {
 }
 QUADRANT_HATCHES = {"green": "", "yellow": "....", "orange": "////", "red": "xxxx"}
 
-ORACLE = "oracle"
-DETECTOR_NAMES = {
-    "odisar": "ODiSAR",
-    "rmse": "forecast RMSE",
-    "rmse-short-lead": "forecast RMSE, short lead",
-    ORACLE: "oracle (knows 'disturbed now')",
-}
-# Okabe and Ito (2008): told apart with any kind of colour vision.
-_PALETTE = ("#0072B2", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
-_ORACLE_COLOUR = "#555555"
-_MARKERS = ("o", "s", "^", "D", "v", "P")
-_ORACLE_MARKER = "X"
-
 METRIC_NAMES = {
     "auroc": "AUROC",
     "tnr_at_tpr95": "TNR@TPR95",
@@ -57,14 +46,19 @@ METRIC_NAMES = {
     "delay_p50_s": "delay p50 [s]",
     "delay_p90_s": "delay p90 [s]",
     "lead_time_p50_s": "lead time p50 [s]",
+    "vus_pr": "VUS-PR",
 }
 #: Metrics that are shares, shown in percent.
-SHARES = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood", "events_detected")
+SHARES = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood", "events_detected", "vus_pr")
 
 #: Shade of the time in which a disturbance is active.
 EVENT_COLOUR = "#b8c4d6"
 
 _DPI = 150
+_PAGE_INCHES = 9.2
+#: An axis from 1 to less than this has room for 2 and 5 in each decade.
+_FEW_DECADES = 300.0
+_LEGEND_INCHES = 7.4
 _TITLE_INCHES = 0.32
 #: Lines of a channel's name beside a panel: broken at spaces and underscores, inside of a word
 #: only where it is longer than a line.
@@ -144,25 +138,21 @@ def row_inches(labels: Iterable[str], least: float = 1.05) -> float:
     return max(least, _CHARACTER_INCHES * longest + _ROW_GAP_INCHES)
 
 
-def detector_name(detector: str) -> str:
-    """Return a detector's name for a legend."""
-    return DETECTOR_NAMES.get(detector, detector)
+def row_of_panels(panels: int) -> float:
+    """Return how wide a figure with so many panels in a row is: at least as wide as a legend."""
+    return max(_LEGEND_INCHES, min(2.4, max(1.55, _PAGE_INCHES / panels)) * panels + 0.6)
 
 
-def detector_colour(detector: str, detectors: Sequence[str]) -> str:
-    """Return a detector's colour: its place among the set-up's detectors, or the oracle's grey."""
-    if detector == ORACLE:
-        return _ORACLE_COLOUR
-    known = [name for name in detectors if name != ORACLE]
-    return _PALETTE[known.index(detector) % len(_PALETTE)]
+def plain_logarithm(axis: Axis) -> None:
+    """Let a logarithmic axis say 0.5, 1 and 20 rather than powers of ten; call it when drawn on.
 
-
-def detector_marker(detector: str, detectors: Sequence[str]) -> str:
-    """Return a detector's marker, so that colour is not the only difference."""
-    if detector == ORACLE:
-        return _ORACLE_MARKER
-    known = [name for name in detectors if name != ORACLE]
-    return _MARKERS[known.index(detector) % len(_MARKERS)]
+    Over many decades there is room for one number in each of them.
+    """
+    low, high = axis.get_view_interval()
+    few = high < _FEW_DECADES * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def strength_name(strength: float) -> str:

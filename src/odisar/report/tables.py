@@ -1,22 +1,17 @@
 """Result tables as the report prints them: text cells, intervals in brackets, published beside."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from odisar.report.detectors import ORACLE, detector_name
 from odisar.report.headline import headline_table
 from odisar.report.load import OVERALL, Results, rows_of
-from odisar.report.picking import lead_time_note
-from odisar.report.style import (
-    METRIC_NAMES,
-    ORACLE,
-    QUADRANT_NAMES,
-    SHARES,
-    detector_name,
-    strength_name,
-)
+from odisar.report.picking import lead_time_note, same_strength
+from odisar.report.style import METRIC_NAMES, QUADRANT_NAMES, SHARES, strength_name
 
 DETECTION_METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
 EVENT_METRICS = ("events_detected", "delay_p50_s", "delay_p90_s", "lead_time_p50_s")
@@ -71,11 +66,14 @@ def metric_cell(value: float, low: float, high: float, metric: str) -> str:
     return f"{text} [{scale * low:.1f}, {scale * high:.1f}]"
 
 
-def headline(results: Results) -> Table:
-    """Return the headline table, published values beside those at full strength."""
+def headline(results: Results, *, every_detector: bool = False) -> Table:
+    """Return the headline table, published values beside those at full strength.
+
+    Of the alternatives only the best is in it, unless ``every_detector`` is asked for.
+    """
     rows = results.detection
     rows = rows[(rows.protocol == "P2") & (rows.evaluated_on == OVERALL)]
-    frame = headline_table(results.detection)
+    frame = headline_table(results.detection, every_detector=every_detector)
     keys = frame[["set-up", "strength", "detector"]]
     published = [
         _published_line(rows, setup, strength, detector)
@@ -84,12 +82,14 @@ def headline(results: Results) -> Table:
     frame["detector"] = frame["detector"].map(detector_name)
     frame["published (AUROC / TNR@TPR95 / F1 IND / F1 OOD)"] = published
     told = [name for name in frame.columns if (frame[name] != "").any()]
-    return frame_table(
-        "Overall, protocol P2",
-        frame[told],
+    note = (
         "95 % intervals in brackets: bootstrap over recordings, exact Poisson for false alarms. "
-        "Published values come from other data and another protocol.",
+        "Published values come from other data and another protocol."
     )
+    if every_detector:
+        return frame_table("Overall, protocol P2, every detector", frame[told], note, folded=True)
+    note += " Of the cheap alternatives only that with the best mean AUROC is listed."
+    return frame_table("Overall, protocol P2", frame[told], note)
 
 
 def _published_line(rows: pd.DataFrame, setup: str, strength: str, detector: str) -> str:
@@ -110,16 +110,18 @@ def scenario_tables(results: Results, setup: str) -> list[Table]:
     order = list(results.scenarios(setup).evaluated_on)
     tables = []
     for strength in sorted(rows.strength.unique(), key=lambda s: (pd.isna(s), -s)):
-        same = rows[rows.strength.isna() if pd.isna(strength) else rows.strength == strength]
+        same = same_strength(rows, strength)
         title = f"{setup}: by scenario"
         title += "" if pd.isna(strength) else f", strength {strength_name(strength)}"
         tables.append(
-            _wide(title, same, order, metrics, folded=True, note=lead_time_note(results, setup))
+            scenario_table(
+                title, same, order, metrics, folded=True, note=lead_time_note(results, setup)
+            )
         )
     return tables
 
 
-def _wide(
+def scenario_table(
     title: str,
     rows: pd.DataFrame,
     order: Sequence[str],
@@ -128,19 +130,19 @@ def _wide(
     folded: bool = False,
     note: str = "",
 ) -> Table:
+    """Return a line for each scenario, in ``order``, and detector; ``rows`` are of one strength."""
     lines = []
-    for name in [name for name in order if name in set(rows.evaluated_on)]:
-        own = rows[rows.evaluated_on == name]
-        for detector in own.detector.unique():
-            values = own[own.detector == detector].set_index("metric")
-            lines.append(
-                [name, detector_name(detector), *(_lookup(values, metric) for metric in metrics)]
-            )
+    for name, detector in _keys(rows, order):
+        own = rows[(rows.evaluated_on == name) & (rows.detector == detector)]
+        values = own.set_index("metric")
+        cells = [lookup(values, metric) for metric in metrics]
+        lines.append([name, detector_name(detector), *cells])
     heads = [METRIC_NAMES[m] + (" %" if m in SHARES else "") for m in metrics]
     return Table(title, ["evaluated on", "detector", *heads], lines, note, folded)
 
 
-def _lookup(values: pd.DataFrame, metric: str) -> str:
+def lookup(values: pd.DataFrame, metric: str) -> str:
+    """Return the cell of a metric, by which ``values`` are indexed."""
     if metric not in values.index:
         return "-"
     row: Any = values.loc[metric]
@@ -152,32 +154,43 @@ def paper_protocol(results: Results, setup: str) -> Table:
     rows = results.detection
     rows = rows[(rows.setup == setup) & (rows.protocol == "P1")]
     strongest = results.strengths(setup)[-1]
-    rows = rows[rows.strength.isna() if pd.isna(strongest) else rows.strength == strongest]
-    lines = []
-    for name in results.scenarios(setup).evaluated_on:
-        own = rows[rows.evaluated_on == name]
-        for detector in own.detector.unique():
-            values = own[own.detector == detector].set_index("metric")
-            cells = [_lookup(values, metric) for metric in DETECTION_METRICS]
-            published = values.published.reindex(list(DETECTION_METRICS))
-            known = [("-" if pd.isna(v) else f"{100 * v:.1f}") for v in published]
-            lines.append(
-                [
-                    name,
-                    detector_name(detector),
-                    *cells,
-                    " / ".join(known) if any_known(known) else "",
-                ]
-            )
-    heads = [f"{METRIC_NAMES[metric]} %" for metric in DETECTION_METRICS]
     title = f"{setup}: protocol P1 beside its oracle"
     title += "" if pd.isna(strongest) else f", strength {strength_name(strongest)}"
-    return Table(title, ["evaluated on", "detector", *heads, "published"], lines, folded=True)
+    order = list(results.scenarios(setup).evaluated_on)
+    return published_beside(title, same_strength(rows, strongest), order, folded=True)
 
 
-def any_known(cells: Sequence[str]) -> bool:
-    """Whether any cell holds more than a dash."""
-    return any(cell != "-" for cell in cells)
+def published_beside(
+    title: str,
+    rows: pd.DataFrame,
+    order: Sequence[str],
+    note: str = "",
+    *,
+    folded: bool = False,
+) -> Table:
+    """Return detection metrics by scenario (in ``order``) and detector, with what was published.
+
+    ``rows`` are of one protocol and strength. Without a published value there is no such column.
+    """
+    found = scenario_table(title, rows, order, DETECTION_METRICS, folded=folded, note=note)
+    known = rows.set_index(["evaluated_on", "detector", "metric"]).published
+    if known.isna().all():
+        return found
+    lines = []
+    for line, (name, detector) in zip(found.rows, _keys(rows, order), strict=True):
+        values = [known.get((name, detector, metric), np.nan) for metric in DETECTION_METRICS]
+        told = ["-" if pd.isna(value) else f"{100 * value:.1f}" for value in values]
+        lines.append([*line, " / ".join(told) if set(told) != {"-"} else ""])
+    return replace(found, columns=[*found.columns, "published"], rows=lines)
+
+
+def _keys(rows: pd.DataFrame, order: Sequence[str]) -> list[tuple[str, str]]:
+    """Return scenario and detector of each line of a scenario table."""
+    return [
+        (name, str(detector))
+        for name in order
+        for detector in rows[rows.evaluated_on == name].detector.unique()
+    ]
 
 
 def operating(results: Results) -> Table:

@@ -7,24 +7,32 @@ import numpy as np
 import pandas as pd
 
 from odisar.artifacts import Workspace, write_json, write_table
-from odisar.report.load import Results, report_folder
+from odisar.report.load import report_folder
 
-from .invented_tables import SETUPS, detection_rows, quadrant_rows
+from .invented_comparisons import leakage_rows, paired_rows, rule_rows
+from .invented_tables import (
+    DEPLOYED,
+    SETUPS,
+    STATES,
+    attribution_rows,
+    blame_rows,
+    detection_rows,
+    quadrant_rows,
+    reliability_curve_rows,
+    reliability_rows,
+)
 
 ROOT = Path(__file__).parents[3]
-STATES = ("Surge Speed", "Sway Speed", "Yaw Rate", "Roll Angle", "Roll Rate")
 DISTURBED, CLEAN = "test-turning-20-case-3-s1", "test-turning-20-clean-1"
 EVENT = [420.0, 840.0]
 
 
 def write_results(workspace: Workspace) -> None:
-    write_table(workspace.results / "detection.csv", detection_rows())
-    write_table(workspace.results / "quadrants.csv", quadrant_rows())
     operating = pd.DataFrame(
         [
             (setup, name, 20, 1000, 8.0, 4, 0.5, 0.2, 0.9, 10, 8)
             for setup in SETUPS
-            for name in ("odisar", "rmse")
+            for name in DEPLOYED
         ],
         columns=[
             "setup",
@@ -40,17 +48,25 @@ def write_results(workspace: Workspace) -> None:
             "events_detected",
         ],
     )
-    write_table(workspace.results / "operating.csv", operating)
-    attribution = pd.DataFrame(
-        [(setup, "overall", 1.0, state, 30, 0.2, 0.6) for setup in SETUPS for state in STATES],
-        columns=["setup", "evaluated_on", "strength", "state", "flagged_windows", "top_1", "top_3"],
-    )
-    write_table(workspace.results / "attribution.csv", attribution)
     nearness = pd.DataFrame(
         [(setup, "test", 100, 0.2, 0.2, 0.3, 0.6) for setup in SETUPS],
         columns=["member", "split", "windows", "smallest", "quantile_01", "median", "quantile_99"],
     )
-    write_table(workspace.results / "nearness.csv", nearness)
+    tables = {
+        "detection": detection_rows(),
+        "operating": operating,
+        "paired": paired_rows(),
+        "thresholds": rule_rows(),
+        "quadrants": quadrant_rows(),
+        "attribution": attribution_rows(),
+        "blame": blame_rows(),
+        "reliability": reliability_rows(),
+        "reliability-curves": reliability_curve_rows(),
+        "leakage": leakage_rows(),
+        "nearness": nearness,
+    }
+    for name, table in tables.items():
+        write_table(workspace.results / f"{name}.csv", table)
 
 
 def write_artefacts(workspace: Workspace) -> None:
@@ -79,7 +95,10 @@ def write_artefacts(workspace: Workspace) -> None:
             "epoch": n,
             "train_forecast_mse": 0.5,
             "train_reconstruction_mse": 0.1,
+            "train_next_mse": 1.0,
             "validation_forecast_mse": 0.4,
+            "validation_next_mse": 0.9,
+            "validation_loss": 1.3,
         }
         for n in range(3)
     ]
@@ -87,13 +106,14 @@ def write_artefacts(workspace: Workspace) -> None:
         "history": history,
         "windows_seen": 480,
         "training_windows": 240,
-        "best_validation_forecast_mse": 0.4,
+        "best_validation_loss": 0.4,
     }
     write_json(workspace.train / "training.json", dict.fromkeys(SETUPS, summary))
     limits = {
-        "thresholds": {"reconstruction": 0.1, "variance": 0.01},
-        "sigma": {"odisar": 0.1},
-        "operating": {"odisar": 0.09},
+        "thresholds": {"score": 0.1, "reconstruction": 0.1, "variance": 0.01},
+        "sigma": dict.fromkeys(DEPLOYED, 0.1),
+        "operating": dict.fromkeys(DEPLOYED, 0.09),
+        "promise": "at most 27% of fresh blocks raise an alarm",
         "operating_hours": 8.0,
         "operating_pooled": 0,
         "calibration_hours": 8.0,
@@ -107,13 +127,13 @@ def write_artefacts(workspace: Workspace) -> None:
 def study(layers: int) -> dict[str, object]:
     """Return a member's tuning: a complete trial, a better one, and a pruned one."""
     trials = [
-        {"number": number, "state": state, "validation_forecast_mse": error}
+        {"number": number, "state": state, "validation_loss": error}
         for number, state, error in ((0, "complete", 0.4), (1, "complete", 0.3), (2, "pruned", 0.5))
     ]
     return {
         "configured": trials[0],
         "tuned": {"twin.layers": layers},
-        "best_validation_forecast_mse": 0.3,
+        "best_validation_loss": 0.3,
         "trials": trials,
     }
 
@@ -125,7 +145,7 @@ def write_assessments(workspace: Workspace, setup: str) -> None:
             "issued_s": start,
             "start_s": start + 1,
             "end_s": start + 60,
-            "reconstruction_error": 0.2 if 420 <= start < 840 else 0.05,
+            "score": 0.2 if 420 <= start < 840 else 0.05,
             "uncertainty_variance": 0.005,
             "category": "red" if 420 <= start < 840 else "green",
             "state_attribution": {"Yaw Rate": 0.3} if 420 <= start < 840 else {},
@@ -134,11 +154,21 @@ def write_assessments(workspace: Workspace, setup: str) -> None:
     ]
     workspace.evaluate.mkdir(parents=True, exist_ok=True)
     workspace.assessments(setup).write_text(json.dumps(rows))
+    pd.concat(
+        score_rows(name, disturbed=name == DISTURBED) for name in (DISTURBED, CLEAN)
+    ).to_parquet(workspace.scores(setup), index=False)
+
+
+def score_rows(recording: str, *, disturbed: bool) -> pd.DataFrame:
+    """Return scores that rise 10 s after the onset; the monitor's first ones are not known yet."""
     times = np.arange(60.0, 1200.0)
-    scores = np.where((times >= 420) & (times < 840), 0.2, 0.05)
-    pd.DataFrame({"recording": DISTURBED, "time_s": times, "odisar": scores}).to_parquet(
-        workspace.scores(setup)
-    )
+    waves = 0.05 + 0.03 * np.sin(times / 7)
+    raised = disturbed & (times >= EVENT[0] + 10) & (times < EVENT[1])
+    scores = pd.DataFrame({"recording": recording, "time_s": times})
+    for number, detector in enumerate(DEPLOYED):
+        scores[detector] = waves + raised * (0.2 - 0.02 * number)
+    scores.loc[times < 70, "odisar"] = np.nan
+    return scores
 
 
 def write_examples(workspace: Workspace) -> None:
@@ -172,9 +202,13 @@ def write_examples(workspace: Workspace) -> None:
             "is_overall",
             "events",
         ],
-    ).assign(disturbance="", fault_channel="", fault_size="").to_csv(
-        folder / "recordings.csv", index=False
-    )
+    ).assign(
+        case="vessel",
+        disturbance=lambda table: np.where(table.is_disturbed, "case-3", "none"),
+        components=lambda table: np.where(table.is_disturbed, "all", "none"),
+        fault_channel="",
+        fault_size="",
+    ).to_csv(folder / "recordings.csv", index=False)
     times = np.arange(0.0, 1200.0, 10.0)
     pd.concat(
         pd.DataFrame(
@@ -208,60 +242,3 @@ def write_examples(workspace: Workspace) -> None:
         for setup in SETUPS
         for state in STATES
     ).to_parquet(folder / "forecasts.parquet")
-
-
-def add(results: Results, metric: str, detector: str, **columns: object) -> None:
-    """Add a P2 row to the detection table of set-up vessel-all."""
-    row = {"setup": "vessel-all", "protocol": "P2", "metric": metric, "detector": detector}
-    results.detection.loc[len(results.detection)] = pd.Series(row | columns)
-
-
-def with_faults(results: Results, *names: str) -> None:
-    """Add copies of the clean test recording with a fault, by kind and size, as "bias 1 sd"."""
-    known = results.examples.recordings
-    clean = known[known.recording == CLEAN]
-    for name in names:
-        kind, _, size = name.partition(" ")
-        copy = clean.assign(
-            recording=f"{CLEAN}-{name}",
-            is_disturbed=True,
-            is_overall=True,
-            events=json.dumps([EVENT]),
-            disturbance=kind,
-            fault_channel="Yaw Rate",
-            fault_size=size,
-        )
-        for _, row in copy.iterrows():
-            known.loc[len(known)] = row
-
-
-def since_1970(results: Results) -> float:
-    """Let the recordings' clocks begin far from zero; return at which second."""
-    start_s = 1.7e9
-    examples = results.examples
-    examples.traces["time_s"] += start_s
-    examples.forecasts[["time_s", "issued_s"]] += start_s
-    examples.chosen["vessel"]["disturbed"]["events"] = [[start_s + time for time in EVENT]]
-    return start_s
-
-
-def without_disturbed(results: Results) -> None:
-    """Leave what is known where no test recording is disturbed."""
-    results.detection = results.detection[results.detection.metric == "false_alarms_per_hour"]
-    results.quadrants = results.quadrants.iloc[:0]
-    results.attribution = results.attribution.iloc[:0]
-    known = results.examples.recordings
-    known["is_disturbed"] = known["is_overall"] = False
-    known["events"] = "[]"
-    known["strength"] = np.nan
-    for kind in results.examples.chosen["vessel"].values():
-        kind["events"] = []
-
-
-def change(results: Results, metric: str, detector: str = "odisar", **columns: float) -> None:
-    """Overwrite the overall P2 rows of a metric of set-up vessel-all."""
-    table = results.detection
-    rows = (table.setup == "vessel-all") & (table.metric == metric)
-    rows &= (table.detector == detector) & (table.protocol == "P2")
-    for name, value in columns.items():
-        table.loc[rows, name] = value

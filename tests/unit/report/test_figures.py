@@ -10,9 +10,11 @@ from odisar.report.figures.learning import tuning_trials
 from odisar.report.figures.quadrants import quadrant_distribution
 from odisar.report.figures.recordings import recordings_overview
 from odisar.report.gallery import PLATES, draw_figures
-from odisar.report.style import QUADRANTS, channel_label, detector_colour, save_figure
+from odisar.report.style import QUADRANTS, channel_label, save_figure
 
-from .invented import CLEAN, DISTURBED, since_1970, study, with_faults, without_disturbed
+from .altered import since_1970, with_faults, without_disturbed
+from .invented import CLEAN, DISTURBED, study
+from .invented_comparisons import write_study
 from .layout import overlaps
 
 
@@ -26,8 +28,16 @@ def test_every_figure_that_applies_is_drawn_and_old_ones_go(results, tmp_path):
     assert not any("fault" in item.path.name for item in drawn)
 
 
+@pytest.fixture
+def whole(results, workspace):
+    """Results of a workspace in which the full study was run too."""
+    write_study(workspace)
+    return results
+
+
 @pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
-def test_no_panel_is_left_empty(results, plate):
+def test_no_panel_is_left_empty(whole, plate):
+    results = whole
     subject = "vessel-all" if plate.scope == "setup" else "vessel"
     if not plate.applies(results, subject):
         pytest.skip("does not apply to these results")
@@ -36,7 +46,8 @@ def test_no_panel_is_left_empty(results, plate):
 
 
 @pytest.mark.parametrize("plate", PLATES, ids=lambda plate: plate.name)
-def test_no_legend_title_or_label_lies_over_another(results, plate):
+def test_no_legend_title_or_label_lies_over_another(whole, plate):
+    results = whole
     subject = "vessel-all" if plate.scope == "setup" else "vessel"
     if not plate.applies(results, subject):
         pytest.skip("does not apply to these results")
@@ -160,10 +171,3 @@ def test_lead_times_of_a_narrowed_set_up_say_what_they_are_measured_against(resu
     drawn = draw_figures(results, tmp_path / "figures")
     noted = {item.path.stem for item in drawn if "maneuver random only" in item.caption}
     assert noted == {"operating-point-vessel-random"}
-
-
-def test_colours_of_detectors_differ_and_do_not_depend_on_the_oracle():
-    names = ["odisar", "rmse", "rpm-rule", "oracle"]
-    colours = [detector_colour(name, names) for name in names]
-    assert len(set(colours)) == len(names)
-    assert detector_colour("rmse", names[:-1]) == colours[1]

@@ -9,7 +9,7 @@ from odisar.report.page import RunFacts, page_content, render_body, render_page
 from odisar.report.style import save_figure
 from odisar.stages import report as report_stage
 
-from .invented import without_disturbed
+from .altered import without_disturbed
 
 FACTS = RunFacts("abc123", "f00", "beef", "odisar", "2026-01-01", [("train", "from cache")])
 

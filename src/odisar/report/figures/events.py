@@ -10,9 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from odisar.evaluation.alarms import alarm_times
 from odisar.report.clock import Clock, clock, shade_events, trace_of
+from odisar.report.detectors import MONITOR
+from odisar.report.judged import judged_recording
 from odisar.report.load import Results, rows_of
-from odisar.report.ordering import size_key
+from odisar.report.ordering import fault_key
 from odisar.report.style import (
     EVENT_COLOUR,
     QUADRANT_COLOURS,
@@ -114,23 +117,33 @@ def event_attribution(results: Results, setup: str) -> Figure:
         score, strip, blame = figure.subplots(
             3, 1, sharex=True, gridspec_kw={"height_ratios": heights}
         )
-        score.plot(
-            time.all_at(scores.time_s), scores.odisar, color="#0072B2", linewidth=0.9, label="score"
-        )
-        score.axhline(limits["sigma"]["odisar"], color="black", ls="--", lw=0.9, label="threshold")
-        score.axhline(
-            limits["operating"]["odisar"], color="#777777", ls=":", lw=1.1, label="alarm threshold"
-        )
+        _score(score, scores, limits, time)
         shade_events(score, example["events"], time)
-        score.set_ylabel("reconstruction error\n[scaled units]")
-        score.legend(loc="upper left", ncols=4)
-        top = max(float(scores.odisar.max()), limits["sigma"]["odisar"])
-        score.set_ylim(0, 1.22 * max(top, limits["operating"]["odisar"]))
+        judged = judged_recording(results, setup, example["recording"])
+        persistence_s = results.case_of(setup).persistence_s
+        for number, alarm_s in enumerate(alarm_times(judged, MONITOR, persistence_s)):
+            label = None if number else "alarm"
+            score.axvline(time.at(float(alarm_s)), color="#D55E00", lw=1.0, label=label)
+        score.legend(loc="upper left", ncols=5)
         score.set_title(f"{example['recording']}, set-up {setup}")
         _quadrant_strip(strip, windows, time)
         _blame(blame, windows, states, time)
         blame.set_xlabel(time.label)
     return figure
+
+
+def _score(axes: Axes, scores: pd.DataFrame, limits: dict[str, Any], time: Clock) -> None:
+    """Draw the score and both thresholds; logarithmic, as the score is compared by ratios."""
+    own, threshold = scores[MONITOR], limits["thresholds"]["score"]
+    alarm = limits["operating"][MONITOR]
+    axes.plot(time.all_at(scores.time_s), own, color="#0072B2", linewidth=0.9, label="score")
+    axes.axhline(threshold, color="black", ls="--", lw=0.9, label="threshold")
+    axes.axhline(alarm, color="#777777", ls=":", lw=1.1, label="alarm threshold")
+    axes.set_ylabel("score\n(1: usual)")
+    axes.set_yscale("log")
+    low, high = min(float(own.min()), threshold), max(float(own.max()), threshold, alarm)
+    # Room for the legend above all of it.
+    axes.set_ylim(low / 1.15, high * (high / low) ** 0.22)
 
 
 def _quadrant_strip(axes: Axes, windows: pd.DataFrame, time: Clock) -> None:
@@ -163,7 +176,9 @@ def _blame(axes: Axes, windows: pd.DataFrame, states: list[str], time: Clock) ->
             cmap="cividis_r",
         )
         if np.isfinite(values).any():
-            axes.figure.colorbar(mesh, ax=axes, label="error of state\n[scaled units]", pad=0.01)
+            axes.figure.colorbar(
+                mesh, ax=axes, label="explained by state\n[standard deviations]", pad=0.01
+            )
         else:
             centre: dict[str, Any] = {"ha": "center", "va": "center", "color": "#777777"}
             axes.text(0.5, 0.5, "no window was flagged", transform=axes.transAxes, **centre)
@@ -249,27 +264,17 @@ def fault_shares(results: Results, setup: str) -> pd.DataFrame:
         active = pd.Series(data=False, index=own.index)
         for start, end in json.loads(str(one.events)):
             active |= (own.time_s >= start) & (own.time_s < end)
-        flagged = own.odisar[active] > limits[one.member]["sigma"]["odisar"]
+        flagged = own[MONITOR][active] > limits[one.member]["thresholds"]["score"]
         rows.append(
             (one.disturbance, one.fault_size, one.fault_channel, flagged.sum(), active.sum())
         )
     table = pd.DataFrame(rows, columns=["kind", "size", "channel", "flagged", "seconds"])
-    faults = sorted(set(zip(table.kind, table["size"], strict=True)), key=_fault_key)
-    table["fault"] = [_fault_name(row.kind, row.size) for row in rows_of(table)]
+    table["fault"] = [f"{row.kind} {row.size}".strip() for row in rows_of(table)]
     summed = table.groupby(["fault", "channel"], sort=True)[["flagged", "seconds"]].sum()
     return (
         (summed.flagged / summed.seconds)
         .rename("share")
         .reset_index()
         .pivot_table(index="fault", columns="channel", values="share")
-        .reindex([_fault_name(*fault) for fault in faults])
+        .reindex(sorted(set(table.fault), key=fault_key))
     )
-
-
-def _fault_key(fault: tuple[str, str]) -> tuple[str, float, str]:
-    kind, size = fault
-    return kind, *size_key(size)
-
-
-def _fault_name(kind: str, size: str) -> str:
-    return f"{kind} {size}".strip()

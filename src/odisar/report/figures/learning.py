@@ -3,43 +3,55 @@
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from odisar.report.load import Results
 from odisar.report.style import figure_style
 
 #: Share of the room between two trial numbers over which folds are spread.
 _FOLDS_WIDTH = 0.7
-_TRAIN, _VALIDATION, _RECONSTRUCTION = "#56B4E9", "#0072B2", "#009E73"
+_FORECAST, _NEXT, _RECONSTRUCTION = "#0072B2", "#D55E00", "#009E73"
 
 
 def training_curves(results: Results, setup: str) -> Figure:
-    """Draw forecast error and reconstruction loss over the epochs of each member."""
+    """Draw every part of the loss over the epochs of each member."""
     members = list(results.limits(setup))
     histories = {name: pd.DataFrame(results.training[name]["history"]) for name in members}
     columns = min(3, len(members))
     rows = -(-len(members) // columns)
     with figure_style():
-        figure = Figure(figsize=(max(3.1 * columns, 6.0), 2.3 * rows + 0.6))
+        figure = Figure(figsize=(max(3.1 * columns, 6.8), 2.4 * rows + 0.8))
         grid = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
         for axes, (name, history) in zip(grid, histories.items(), strict=False):
-            epochs = history.epoch + 1
-            lines = (
-                ("train_forecast_mse", "forecast (training)", _TRAIN, "-"),
-                ("validation_forecast_mse", "forecast (validation)", _VALIDATION, "-"),
-                ("train_reconstruction_mse", "reconstruction (training)", _RECONSTRUCTION, "--"),
-            )
-            for column, label, colour, style in lines:
-                axes.plot(epochs, history[column], color=colour, ls=style, marker=".", label=label)
+            for values, label, colour, style in _curves(history):
+                axes.plot(
+                    history.epoch + 1, values, color=colour, ls=style, marker=".", label=label
+                )
             axes.set_title(name)
             axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             _whole_epochs(axes, len(history))
         for axes in grid[len(members) :]:
             axes.set_visible(False)
         figure.supxlabel("epoch", fontsize=9)
-        figure.supylabel("mean squared error [scaled units$^2$]", fontsize=9)
+        weighed = results.config.training.weigh_loss
+        unit = "1: what the closed form leaves" if weighed else "scaled units$^2$"
+        figure.supylabel(f"mean squared error\n[{unit}]", fontsize=9)
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
+
+
+def _curves(history: pd.DataFrame) -> list[tuple[pd.Series, str, str, str]]:
+    """Return the parts of the loss: values, label, colour and line."""
+    # The validation loss is the sum of both forecasts, in the units that they are trained in.
+    forecast = history.validation_loss - history.validation_next_mse
+    return [
+        (history.train_forecast_mse, "forecast (training)", _FORECAST, ":"),
+        (forecast, "forecast (validation)", _FORECAST, "-"),
+        (history.train_next_mse, "next sample (training)", _NEXT, ":"),
+        (history.validation_next_mse, "next sample (validation)", _NEXT, "-"),
+        (history.train_reconstruction_mse, "reconstruction (training)", _RECONSTRUCTION, ":"),
+    ]
 
 
 def _whole_epochs(axes: Axes, epochs: int) -> None:
@@ -48,14 +60,14 @@ def _whole_epochs(axes: Axes, epochs: int) -> None:
 
 
 def tuning_trials(results: Results) -> Figure:
-    """Draw the validation forecast error of every trial, pruned ones hollow, the best ringed."""
+    """Draw the validation loss of every trial, pruned ones hollow, the best ringed."""
     setups = results.setups
     with figure_style():
         figure = Figure(figsize=(max(3.3 * len(setups), 4.6), 2.9))
         grid = figure.subplots(1, len(setups), squeeze=False, sharey=True)[0]
         for axes, setup in zip(grid, setups, strict=True):
             _trials(axes, results, setup)
-        grid[0].set_ylabel("validation forecast\nerror [scaled units$^2$]")
+        grid[0].set_ylabel("validation loss (both forecasts)")
         figure.supxlabel("trial (0: the configured values)", fontsize=9)
         handles, labels = grid[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3)
@@ -66,9 +78,7 @@ def _trials(axes: Axes, results: Results, setup: str) -> None:
     trials = _all_trials(results, setup)
     complete = trials[trials.state == "complete"]
     pruned = trials[trials.state != "complete"]
-    axes.scatter(
-        complete.place, complete.validation_loss, color=_VALIDATION, s=24, label="complete"
-    )
+    axes.scatter(complete.place, complete.validation_loss, color=_FORECAST, s=24, label="complete")
     axes.scatter(
         pruned.place,
         pruned.validation_loss,

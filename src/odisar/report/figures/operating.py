@@ -5,14 +5,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from odisar.report.detectors import detector_look, detector_name
 from odisar.report.load import OVERALL, Results, rows_of
-from odisar.report.style import (
-    detector_colour,
-    detector_marker,
-    detector_name,
-    figure_style,
-    strength_name,
-)
+from odisar.report.picking import shown_detectors
+from odisar.report.style import figure_style, strength_name
 
 
 def operating_point(results: Results, setup: str) -> Figure:
@@ -41,16 +37,17 @@ def operating_point(results: Results, setup: str) -> Figure:
 
 
 def _false_alarms(axes: Axes, results: Results, setup: str) -> None:
+    detectors = shown_detectors(results.detection, setup)
     rows = results.operating[results.operating.setup == setup]
-    detectors = results.detectors(setup)
+    rows = rows[rows.detector.isin(detectors)]
     for place, row in enumerate(rows_of(rows)):
         rate = float(row.false_alarms_per_hour)
         axes.errorbar(
             place,
             rate,
             yerr=[[rate - float(row.ci_low)], [float(row.ci_high) - rate]],
-            fmt=detector_marker(row.detector, detectors),
-            color=detector_colour(row.detector, detectors),
+            fmt=detector_look(row.detector, detectors).marker,
+            color=detector_look(row.detector, detectors).colour,
             elinewidth=1.3,
             markersize=4.5,
         )
@@ -72,7 +69,7 @@ def _over_strength(
     scale: float = 1.0,
 ) -> None:
     strengths = results.strengths(setup)
-    detectors = results.detectors(setup)
+    detectors = shown_detectors(results.detection, setup)
     width = 0.6 / len(detectors)
     for number, detector in enumerate(detectors):
         for metric, fill in zip(metrics, ("full", "none"), strict=False):
@@ -87,9 +84,9 @@ def _over_strength(
                 at + (number - (len(detectors) - 1) / 2) * width,
                 values,
                 yerr=bars,
-                fmt=detector_marker(detector, detectors),
+                fmt=detector_look(detector, detectors).marker,
                 fillstyle=fill,
-                color=detector_colour(detector, detectors),
+                color=detector_look(detector, detectors).colour,
                 elinewidth=1.3,
                 markersize=4.5,
                 label=detector_name(detector) if fill == "full" else None,
@@ -97,7 +94,7 @@ def _over_strength(
     axes.set_xticks(range(len(strengths)), [strength_name(s) for s in strengths])
     axes.set_xlim(-0.5, len(strengths) - 0.5)
     axes.grid(visible=False, axis="x")
-    if len(strengths) > 1:
+    if pd.notna(strengths[-1]):
         axes.set_xlabel("strength")
 
 

@@ -9,7 +9,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from odisar.report.load import Results
 from odisar.report.style import (
@@ -18,6 +17,7 @@ from odisar.report.style import (
     QUADRANT_NAMES,
     QUADRANTS,
     figure_style,
+    plain_logarithm,
     strength_name,
     with_strength,
 )
@@ -174,21 +174,21 @@ def _legend(figure: Figure) -> None:
 
 
 def quadrant_scatter(results: Results, setup: str) -> Figure:
-    """Draw reconstruction error against variance of every assessed window, thresholds as lines.
+    """Draw score against variance of every assessed window, thresholds as lines.
 
     With several members, each with thresholds of its own, both axes are multiples of them.
     """
     windows = results.assessments(setup)
     limits = results.limits(setup)
     if len(limits) == 1:
-        columns = ("reconstruction_error", "uncertainty_variance")
+        columns = ("score", "uncertainty_variance")
         thresholds = next(iter(limits.values()))["thresholds"]
-        lines = (thresholds["reconstruction"], thresholds["variance"])
-        names = ("reconstruction error [scaled units]", "predictive variance [scaled units$^2$]")
+        lines = (thresholds["score"], thresholds["variance"])
+        names = ("score (1: usual)", "predictive variance [scaled units$^2$]")
     else:
-        columns, lines = ("error_ratio", "variance_ratio"), (1.0, 1.0)
+        columns, lines = ("score_ratio", "variance_ratio"), (1.0, 1.0)
         names = (
-            "reconstruction error [multiples of its threshold]",
+            "score [multiples of its threshold]",
             "predictive variance\n[multiples of its threshold]",
         )
     with figure_style():
@@ -204,9 +204,7 @@ def quadrant_scatter(results: Results, setup: str) -> Figure:
         grid[0].set_xscale("log")
         grid[0].set_yscale("log")
         for axis in (grid[0].xaxis, grid[0].yaxis):
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            axis.set_minor_formatter(NullFormatter())
+            plain_logarithm(axis)
         grid[0].set_ylabel(names[1])
         figure.supxlabel(names[0] + "; dashed and dotted: thresholds", fontsize=9)
         _legend(figure)

@@ -1,0 +1,126 @@
+"""How well the horizon is forecast, step by step, beside simpler forecasters (from the study)."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from odisar.report.load import Results
+from odisar.report.style import figure_style
+
+ALL_STATES, ALL_STEPS = "all", 0
+#: Whether the commands of the horizon were given to the forecasters.
+_UNKNOWN, _KNOWN = "unknown", "known-ahead"
+FORECASTER_NAMES = {
+    "twin": "twin",
+    "odisar": "twin",
+    "closed-form": "closed form",
+    "persistence": "persistence",
+    "constant-velocity": "constant velocity",
+    "last-state": "last state repeated",
+    "direct-linear": "linear, a step at a time",
+    "gru": "GRU",
+    "rnn": "LSTM",
+    "vae": "VAE",
+    "gan": "GAN",
+    "published-mixer": "published mixer",
+}
+# Okabe and Ito (2008), then Tol's muted scheme; markers and dashes besides.
+_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#E69F00",
+    "#CC79A7",
+    "#56B4E9",
+    "#332288",
+    "#882255",
+    "#999933",
+    "#555555",
+)
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
+_ACROSS = 3
+
+
+def has_forecasts(results: Results, setup: str) -> bool:
+    """Whether the study has judged forecasts of this set-up."""
+    table = results.study("forecast")
+    return table is not None and bool((table.setup == setup).any())
+
+
+def error_by_step(results: Results, setup: str) -> Figure:
+    """Draw each forecaster's error over the steps ahead: all states (scaled), and each in its unit.
+
+    Raises OdisarError where the study has not judged forecasts.
+    """
+    table = forecasts_of(results, setup)
+    states = sorted(table.state.unique(), key=lambda state: state != ALL_STATES)
+    forecasters = list(dict.fromkeys(table.forecaster))
+    units = {channel.name: channel.unit for channel in results.case_of(setup).channels}
+    across = min(_ACROSS, len(states))
+    down = -(-len(states) // across)
+    with figure_style():
+        figure = Figure(figsize=(max(3.1 * across, 6.8), 2.3 * down + 0.9))
+        grid = figure.subplots(down, across, squeeze=False, sharex=True).ravel()
+        for axes, state in zip(grid, states, strict=False):
+            own = table[table.state == state]
+            _lines(axes, own, forecasters, 1 / results.case_of(setup).rate_hz)
+            whole = state == ALL_STATES
+            axes.set_title("all states [scaled]" if whole else _titled(state, units))
+            axes.set_ylim(bottom=0)
+        for axes in grid[len(states) :]:
+            axes.set_visible(False)
+        figure.supxlabel("seconds ahead", fontsize=9)
+        figure.supylabel("root mean square error", fontsize=9)
+        _legend(figure, table, forecasters)
+    return figure
+
+
+def forecasts_of(results: Results, setup: str) -> pd.DataFrame:
+    """Return a set-up's errors by single steps; empty where the study has none."""
+    table = results.study("forecast")
+    if table is None:
+        return pd.DataFrame(columns=["setup", "forecaster", "commands", "state", "step", "rmse"])
+    return table[(table.setup == setup) & (table.step != ALL_STEPS)]
+
+
+def forecaster_name(forecaster: str) -> str:
+    """Return a forecaster's name for a legend."""
+    return FORECASTER_NAMES.get(forecaster, forecaster)
+
+
+def _titled(state: str, units: dict[str, str]) -> str:
+    return f"{state} [{units[state]}]" if state in units else state
+
+
+def _lines(axes: Axes, rows: pd.DataFrame, forecasters: Sequence[str], step_s: float) -> None:
+    physical = "rmse_physical" in rows and rows.rmse_physical.notna().all()
+    for (name, commands), own in rows.groupby(["forecaster", "commands"], sort=False):
+        place = forecasters.index(str(name))
+        ordered = own.sort_values("step")
+        errors = ordered.rmse_physical if physical else ordered.rmse
+        axes.plot(
+            step_s * ordered.step,
+            errors,
+            color=_COLOURS[place % len(_COLOURS)],
+            marker=_MARKERS[place % len(_MARKERS)],
+            markersize=3.5,
+            linewidth=1.1,
+            linestyle=":" if commands == _KNOWN else "-",
+            markevery=max(1, len(ordered) // 8),
+        )
+
+
+def _legend(figure: Figure, table: pd.DataFrame, forecasters: Sequence[str]) -> None:
+    handles = [
+        Line2D(
+            [], [], color=_COLOURS[place % len(_COLOURS)], marker=_MARKERS[place % len(_MARKERS)],
+            ms=4, lw=1.1, label=forecaster_name(name),
+        )
+        for place, name in enumerate(forecasters)
+    ]  # fmt: skip
+    if set(table.commands) >= {_UNKNOWN, _KNOWN}:
+        handles.append(Line2D([], [], color="black", ls=":", label="commands known ahead"))
+    figure.legend(handles=handles, loc="outside upper center", ncols=4)

@@ -1,0 +1,113 @@
+"""What the Transformer adds to its closed form, and what the monitor has over other scores."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import pandas as pd
+
+from odisar.report.detectors import CLOSED_FORM, RECONSTRUCTION, detector_name
+from odisar.report.figures.pairs import pairs_of
+from odisar.report.load import Results, rows_of
+from odisar.report.style import METRIC_NAMES, SHARES, strength_name
+
+#: Of these, less is better.
+_LESS_IS_BETTER = ("delay_p50_s",)
+ADDS, NOTHING, HARMS, UNKNOWN = "adds", "nothing", "harms", "unknown"
+
+
+def transformer_gain(results: Results, setup: str) -> list[str]:
+    """Say where the Transformer adds something, where nothing, and where it harms (P2, overall)."""
+    rows = _against(results, setup, CLOSED_FORM)
+    if rows.empty:
+        return [f"{setup}: nothing was compared with the closed form alone."]
+    by_verdict: dict[str, list[Any]] = {}
+    for row in rows_of(rows):
+        by_verdict.setdefault(verdict(row), []).append(row)
+    found = {name: _told(own, numbers=name in (ADDS, HARMS)) for name, own in by_verdict.items()}
+    parts = [f"something in {found[ADDS]}" if ADDS in found else "nothing"]
+    if HARMS in found:
+        parts.append(f"it harms {found[HARMS]}")
+    if NOTHING in found:
+        parts.append(f"no difference beyond {_interval(results)} in {found[NOTHING]}")
+    if UNKNOWN in found:
+        parts.append(f"too few recordings for an interval in {found[UNKNOWN]}")
+    head = f"{setup}: what the Transformer adds to its closed form alone (P2, overall)"
+    return [f"{head}: {'; '.join(parts)}."]
+
+
+def monitor_gain(results: Results, setup: str) -> list[str]:
+    """Say how the monitor does against the paper's score and the best of all others (AUROC)."""
+    rows = pairs_of(results, setup)
+    rows = rows[(rows.metric == "auroc") & rows.difference.notna()]
+    sentences = []
+    own = rows[rows.other == RECONSTRUCTION]
+    if not own.empty:
+        sentences.append(f"AUROC minus that of the paper's score: {_listed(rows_of(own))}.")
+    best = rows[rows.is_next_best]
+    if not best.empty:
+        named = [f"{_listed([row])} over {detector_name(row.other)}" for row in rows_of(best)]
+        sentences.append(f"AUROC minus that of the best other detector: {', '.join(named)}.")
+    return sentences
+
+
+def verdict(row: Any) -> str:
+    """Return whether a pair's interval is on the better side of 0, around it, or on the worse."""
+    if pd.isna(row.difference) or pd.isna(row.ci_low) or pd.isna(row.ci_high):
+        return UNKNOWN
+    low, high = row.ci_low, row.ci_high
+    if row.metric in _LESS_IS_BETTER:
+        low, high = -high, -low
+    if low > 0:
+        return ADDS
+    return HARMS if high < 0 else NOTHING
+
+
+def is_worse(row: Any) -> bool:
+    """Whether the monitor has the worse value of a pair, beyond doubt or not."""
+    return bool(row.difference > 0 if row.metric in _LESS_IS_BETTER else row.difference < 0)
+
+
+def _against(results: Results, setup: str, other: str) -> pd.DataFrame:
+    rows = pairs_of(results, setup)
+    return rows[rows.other == other].sort_values(["strength"], kind="stable")
+
+
+def _interval(results: Results) -> str:
+    return f"the {100 * results.config.evaluation.confidence:g} % interval"
+
+
+def _told(rows: Sequence[Any], *, numbers: bool) -> str:
+    """Return metrics with the strengths that they are told of, with numbers if asked for."""
+    by_metric: dict[str, list[Any]] = {}
+    for row in rows:
+        by_metric.setdefault(row.metric, []).append(row)
+    return ", ".join(
+        f"{_metric_name(metric)} ({_listed(own)})" if numbers else _metric_at(metric, own)
+        for metric, own in by_metric.items()
+    )
+
+
+def _metric_name(metric: str) -> str:
+    return "the median delay" if metric in _LESS_IS_BETTER else METRIC_NAMES[metric]
+
+
+def _metric_at(metric: str, rows: Sequence[Any]) -> str:
+    strengths = [strength_name(row.strength) for row in rows if pd.notna(row.strength)]
+    if not strengths:
+        return _metric_name(metric)
+    noun = "strength" if len(strengths) == 1 else "strengths"
+    return f"{_metric_name(metric)} (at {noun} {', '.join(strengths)})"
+
+
+def _listed(rows: Iterable[Any]) -> str:
+    return ", ".join(difference(row) for row in rows)
+
+
+def difference(row: Any) -> str:
+    """Return a pair's difference with its interval, unit and strength."""
+    scale, unit = (100, "points") if row.metric in SHARES else (1, "s")
+    text = f"{scale * row.difference:+.2f}"
+    if pd.notna(row.ci_low) and pd.notna(row.ci_high):
+        text += f" [{scale * row.ci_low:+.2f}, {scale * row.ci_high:+.2f}]"
+    at = "" if pd.isna(row.strength) else f" at strength {strength_name(row.strength)}"
+    return f"{text} {unit}{at}"
