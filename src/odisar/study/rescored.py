@@ -106,7 +106,10 @@ def write_judged(folder: Path, judged: Mapping[str, Judged]) -> None:
         ]
         pd.concat(parts, ignore_index=True).to_parquet(folder / f"{name}.parquet", index=False)
         limits = json.dumps({"sigma": one.sigma, "operating": one.operating}, indent=1)
-        (folder / f"{name}.json").write_text(limits + "\n", encoding="utf-8")
+        # Last and at once: whoever is killed before has nothing that looks finished.
+        unfinished = folder / f"{name}.json.part"
+        unfinished.write_text(limits + "\n", encoding="utf-8")
+        unfinished.replace(folder / f"{name}.json")
 
 
 def read_judged(folder: Path) -> dict[str, Judged]:

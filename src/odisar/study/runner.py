@@ -9,7 +9,7 @@ from odisar.config.loader import ConfigView, load_config
 from odisar.errors import OdisarError
 from odisar.twin.devices import use_one_thread
 
-#: Parts by the module that runs them; those of a set-up are run once for each.
+#: Parts by the module that runs them.
 PARTS = (
     "alternatives",
     "comparing",
@@ -19,6 +19,9 @@ PARTS = (
     "leakage",
     "seeds",
 )
+
+#: Those that are run once for each set-up.
+OF_ONE_SETUP = ("alternatives", "confidence", "forecasting", "seeds")
 
 # NumPy's threads would compete with the processes that share the cores.
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -43,6 +46,11 @@ def run_part(name: str, setup: str | None, root: Path) -> None:
     if not workspace.evaluate.is_dir():
         raise OdisarError("the study stands on the pipeline's results; run `make repro` first")
     view = ConfigView(config, part.PARAMS)
+    takes_setup = name in OF_ONE_SETUP
+    if takes_setup and setup is None:
+        raise OdisarError(f"part {name!r} is run for one set-up: say which, as `study {name} NAME`")
+    if setup is not None and not takes_setup:
+        raise OdisarError(f"part {name!r} is run for all set-ups at once; leave {setup!r} out")
     if setup is None:
         part.run(view, workspace)
     else:

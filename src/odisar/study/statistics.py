@@ -44,6 +44,8 @@ def lead_errors(
         found = []
         for start, stop in item.segments:
             positions = data.spec.issue_positions((start, stop), 1, horizon_steps=0)
+            if not len(positions):
+                continue
             forecast = scorer.forecast(item, positions).forecast.numpy()[:, lead - 1]
             truth = horizon_targets(item.values[:stop], positions, data.spec)[:, lead - 1]
             late = np.full(forecast.shape, np.nan)
