@@ -1,0 +1,90 @@
+"""Fitted scores go through JSON whole; what can't be one is refused."""
+
+import copy
+import json
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from odisar.capability.innovation_values import InnovationScoreValues
+from odisar.capability.innovations import InnovationScore, InnovationSteps
+from odisar.capability.scoring import InnovationScores
+from odisar.seeding import generator
+
+
+def fitted(states: int = 2) -> InnovationScores:
+    random = generator(5, "values")
+    steps = InnovationSteps(mean=6, size=4, recent=2, recent_share=0.25)
+    runs, rebuilt = [random.normal(size=(200, states))], [np.exp(random.normal(size=200))]
+    return InnovationScores(
+        InnovationScore.fit(runs, rebuilt, steps), InnovationScore.fit(runs, None, steps)
+    )
+
+
+@pytest.fixture
+def content():
+    return json.loads(InnovationScoreValues.of(fitted()).model_dump_json())
+
+
+def test_a_score_comes_back_from_json_and_says_the_same(content):
+    scores, back = fitted(), InnovationScoreValues.model_validate(content).build()
+    random = generator(5, "fresh")
+    innovations, rebuilt = random.normal(size=(2, 50, 2)), np.exp(random.normal(size=50))
+    wanted, found = scores.of(*innovations, rebuilt), back.of(*innovations, rebuilt)
+    assert wanted.keys() == found.keys()
+    for name, values in wanted.items():
+        np.testing.assert_array_equal(found[name], values)
+    assert back.twin.known_after_steps == 6
+    assert back.closed_form.reconstruction is None
+
+
+def test_values_come_back_equal(content):
+    values = InnovationScoreValues.model_validate(content)
+    assert InnovationScoreValues.of(values.build()) == values
+
+
+def test_the_number_of_states_is_that_of_every_covariance(content):
+    assert InnovationScoreValues.model_validate(content).states == {2}
+    content["closed_form"]["recent"]["precision"] = [[1.0]]
+    assert InnovationScoreValues.model_validate(content).states == {1, 2}
+
+
+def test_without_a_reconstruction_the_mapping_says_null(content):
+    assert content["closed_form"]["reconstruction"] is None
+    assert set(content["twin"]["reconstruction"]) == {"usual", "rare"}
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "complaint"),
+    [
+        (("mean", "precision"), [[1.0, 0.0], [0.0]], "expected 2 numbers in each row"),
+        (("size", "precision"), [[1.0, 0.0]], "expected 1 numbers in each row"),
+        (("recent", "precision"), [[1.0, 0.0], [0.0, 1e31]], "less than or equal"),
+        (("mean", "precision"), [["1", "0"], ["0", "1"]], "valid number"),
+        (("mean", "scale"), {"usual": 2.0, "rare": 1.0}, "must be above usual=2.0"),
+        (("mean", "scale"), {"usual": 2.0, "rare": 2.0}, "must be above usual=2.0"),
+        (("reconstruction",), {"usual": 0.0, "rare": float("nan")}, "rare"),
+        (("mean", "scale"), {"usual": float("-inf"), "rare": 0.0}, "usual"),
+        (("size", "steps"), 0, "greater than 0"),
+        (("size", "steps"), 2.5, "valid integer"),
+        (("recent_share",), 1.0, "less than 1"),
+        (("recent_share",), -0.1, "greater than or equal to 0"),
+        (("note",), 1, "Extra inputs"),
+    ],
+)
+def test_what_can_be_no_score_is_refused(content, place, value, complaint):
+    spoilt = copy.deepcopy(content)
+    at = spoilt["twin"]
+    for key in place[:-1]:
+        at = at[key]
+    at[place[-1]] = value
+    with pytest.raises(ValidationError, match=complaint):
+        InnovationScoreValues.model_validate(spoilt)
+
+
+@pytest.mark.parametrize("key", ["mean", "size", "recent", "recent_share", "reconstruction"])
+def test_a_part_that_is_missing_is_named(content, key):
+    del content["closed_form"][key]
+    with pytest.raises(ValidationError, match=f"closed_form.{key}"):
+        InnovationScoreValues.model_validate(content)
