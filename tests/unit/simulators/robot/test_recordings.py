@@ -34,6 +34,8 @@ def test_the_shipped_fleet_has_the_planned_sizes(robot):
             made[plan.split, plan.disturbance] += len(plan.recordings)
     assert made == {
         ("development", "noise"): 16,
+        ("development", "correlated-noise"): 8,
+        ("development", "bias"): 8,
         ("test", "noise"): 100,
         ("test", "correlated-noise"): 20,
         ("test", "bias"): 20,
