@@ -36,7 +36,8 @@ DRAWS, DRAWS_PLUS_NOISE, RECALIBRATED = "draws", "draws-plus-noise", "recalibrat
 # deviations from the mean. No recalibration mends a spread that is more than that too small.
 _END = 1e-12
 _KNOTS = 201
-_FEWEST_WINDOWS = 20
+#: Fewer windows than these don't say how often forecasts hold.
+FEWEST_WINDOWS = 20
 #: Levels of the midpoint rule for moments and CRPS; 2000 give a normal's spread to 0.03 %.
 _MIDPOINTS = (np.arange(2000) + 0.5) / 2000
 
@@ -188,10 +189,10 @@ def fit_recalibration(
     nothing = np.empty((0, 1, 1))
     joined = np.concatenate([np.asarray(part, dtype=np.float64) for part in levels] or [nothing])
     windows, horizon, states = joined.shape
-    if windows < _FEWEST_WINDOWS:
+    if windows < FEWEST_WINDOWS:
         raise OdisarError(
             f"{windows} windows cannot say how often forecasts hold; give at least "
-            f"{_FEWEST_WINDOWS} that share no forecast sample, from more held-out recordings"
+            f"{FEWEST_WINDOWS} that share no forecast sample, from more held-out recordings"
         )
     if not 1 <= step_groups <= horizon:
         raise OdisarError(f"{step_groups} step groups don't divide {horizon} steps; take fewer")
@@ -215,7 +216,7 @@ def predictive_distributions(
 
 def _fit_map(levels: FloatArray) -> LevelMap:
     known = np.sort(levels[np.isfinite(levels)])
-    if known.size < _FEWEST_WINDOWS:
+    if known.size < FEWEST_WINDOWS:
         raise OdisarError(
             f"{known.size} known truths of a state cannot say how often forecasts hold; add "
             "held-out recordings or leave the state out"

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from odisar.capability.distribution import NoiseFloor, draws_only, fit_noise, with_noise
 from odisar.capability.recalibration import (
+    FEWEST_WINDOWS,
+    LevelMap,
     Recalibration,
     fit_recalibration,
     predictive_distributions,
@@ -32,9 +34,15 @@ class Distributions:
 
     @classmethod
     def fit(cls, held_out: Sequence[Drawn], calibration: Sequence[Drawn]) -> Self:
-        """Fit the noise on validation recordings, the recalibration on calibration recordings."""
+        """Fit the noise on validation recordings, the recalibration on calibration recordings.
+
+        With fewer than ``FEWEST_WINDOWS`` calibration windows nothing is recalibrated.
+        """
         noise = fit_noise([draws_only(draws) for draws, _ in held_out], [t for _, t in held_out])
         levels = [with_noise(draws_only(draws), noise).levels(t) for draws, t in calibration]
+        windows = sum(len(part) for part in levels)
+        if windows < FEWEST_WINDOWS:  # a few windows say nothing: levels stay as they are
+            return cls(noise, _unchanged(noise, windows))
         return cls(noise, fit_recalibration(levels))
 
     def as_json(self) -> dict[str, Any]:
@@ -81,3 +89,10 @@ def draw_with_truth(
 
 def _within(positions: NDArray[np.int64], start: int, stop: int) -> NDArray[np.int64]:
     return positions[(positions >= start) & (positions < stop)]
+
+
+def _unchanged(noise: NoiseFloor, windows: int) -> Recalibration:
+    """Return a recalibration that leaves every level as it is."""
+    horizon, states = noise.variance.shape
+    same = LevelMap(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    return Recalibration(((same,) * states,), horizon, windows)
