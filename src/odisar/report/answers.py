@@ -16,6 +16,7 @@ from odisar.report.detectors import (
 from odisar.report.figures.leakage import probed
 from odisar.report.figures.pairs import pairs_of
 from odisar.report.figures.reliability import ALL_STATES, DISTRIBUTION_NAMES
+from odisar.report.gains import signed
 from odisar.report.load import Results, rows_of
 from odisar.report.picking import same_strength, shown_detectors
 from odisar.report.style import METRIC_NAMES, SHARES, strength_name
@@ -197,10 +198,10 @@ def pairs(results: Results, setup: str) -> Table:
 def _difference_cell(row: Any, scale: int) -> str:
     if pd.isna(row.difference):
         return "-"
-    text = f"{scale * row.difference:+.2f}{' *' if row.is_next_best else ''}"
+    text = f"{signed(scale * row.difference)}{' *' if row.is_next_best else ''}"
     if pd.isna(row.ci_low) or pd.isna(row.ci_high):
         return text
-    return f"{text} [{scale * row.ci_low:+.2f}, {scale * row.ci_high:+.2f}]"
+    return f"{text} [{signed(scale * row.ci_low)}, {signed(scale * row.ci_high)}]"
 
 
 def blame(results: Results, setup: str) -> Table:

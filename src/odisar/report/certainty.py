@@ -37,28 +37,36 @@ def certainty(results: Results) -> list[str]:
             "false alarms elsewhere."
         )
     sentences += _pooling(results)
-    sentences += [told for setup in results.setups for told in _conformal(results, setup)]
-    return sentences + missing_study(results)
+    return sentences + _conformal(results) + missing_study(results)
 
 
-def _conformal(results: Results, setup: str) -> list[str]:
+def _conformal(results: Results) -> list[str]:
     """Say what the conformal rule promises, which is nothing about an hour, and what it gave."""
+    told = [sentence for setup in results.setups for sentence in _promise(results, setup)]
+    if not told:
+        return []
+    return [
+        (
+            "The conformal threshold promises something per block of time, not per hour, as alarms "
+            f"may come in bursts. {' '.join(told)}"
+        )
+    ]
+
+
+def _promise(results: Results, setup: str) -> list[str]:
     promises = [limit["promise"] for limit in results.limits(setup).values()]
     rows = results.rules
     rows = rows[(rows.setup == setup) & (rows.detector == MONITOR) & (rows.rule == "conformal")]
     if rows.empty:
         return []
     given = rows.iloc[0]
-    which = f", in the first of {len(promises)} folds" if len(promises) > 1 else ""
-    promise = (
-        "The conformal threshold promises something per block, not per hour, as alarms may come in "
-        f"bursts ({setup}{which}): {promises[0]}."
-    )
+    which = f" (the first of {len(promises)} folds)" if len(promises) > 1 else ""
+    promise = f"{setup}{which}: {promises[0]}"
     if not given.hours > 0:
-        return [promise]
+        return [f"{promise}."]
     return [
         (
-            f"{promise} On undisturbed test recordings it gave an alarm in "
+            f"{promise}; on undisturbed test recordings it gave an alarm in "
             f"{100 * given.recordings_alarmed:.0f} % of them, and {given.measured_per_hour:.2f} "
             f"per hour ({given.ci_low:.2f} to {given.ci_high:.2f}) in {given.hours:.1f} h."
         )

@@ -1,14 +1,12 @@
 """What does not work: each check looks for one failing, and says it where it is there."""
 
-from typing import Any
-
 import pandas as pd
 
 from odisar.report.alarm_failings import alarm_failings
 from odisar.report.confidence_failings import confidence_failings
 from odisar.report.detectors import MONITOR, ORACLE, detector_name
 from odisar.report.figures.pairs import pairs_of
-from odisar.report.gains import HARMS, difference, is_worse, verdict
+from odisar.report.gains import HARMS, by_metric, is_worse, metrics_at, verdict
 from odisar.report.load import OVERALL, Results, rows_of
 from odisar.report.picking import Value, at_strength, percent, pick, same_strength
 from odisar.report.style import METRIC_NAMES
@@ -41,17 +39,15 @@ def _below_others(results: Results, setup: str) -> list[str]:
     sentences = []
     for other, part in rows.groupby("other", sort=False):
         worse = [row for row in rows_of(part) if is_worse(row)]
-        clear = ", ".join(_below(row) for row in worse if verdict(row) == HARMS)
-        doubtful = ", ".join(_below(row) for row in worse if verdict(row) != HARMS)
-        parts = [clear, f"not beyond the interval: {doubtful}" if doubtful else ""]
-        if worse:
-            told = "; ".join(part for part in parts if part)
-            sentences.append(f"ODiSAR is behind {detector_name(str(other))}: {told}.")
+        clear = [row for row in worse if verdict(row) == HARMS]
+        doubtful = [row for row in worse if verdict(row) != HARMS]
+        parts = [by_metric(clear)] if clear else []
+        if doubtful:
+            parts.append(f"not beyond the interval in {metrics_at(doubtful)}")
+        if parts:
+            name = detector_name(str(other))
+            sentences.append(f"ODiSAR is behind {name}: {'; '.join(parts)}.")
     return sentences
-
-
-def _below(row: Any) -> str:
-    return f"{METRIC_NAMES[row.metric].removesuffix(' [s]')} {difference(row)}"
 
 
 def _below_published(results: Results, setup: str) -> list[str]:

@@ -1,6 +1,6 @@
 """What the Transformer adds to its closed form, and what the monitor has over other scores."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
@@ -23,7 +23,10 @@ def transformer_gain(results: Results, setup: str) -> list[str]:
     by_verdict: dict[str, list[Any]] = {}
     for row in rows_of(rows):
         by_verdict.setdefault(verdict(row), []).append(row)
-    found = {name: _told(own, numbers=name in (ADDS, HARMS)) for name, own in by_verdict.items()}
+    found = {
+        name: by_metric(own) if name in (ADDS, HARMS) else metrics_at(own)
+        for name, own in by_verdict.items()
+    }
     parts = [f"something in {found[ADDS]}" if ADDS in found else "nothing"]
     if HARMS in found:
         parts.append(f"it harms {found[HARMS]}")
@@ -42,11 +45,15 @@ def monitor_gain(results: Results, setup: str) -> list[str]:
     sentences = []
     own = rows[rows.other == RECONSTRUCTION]
     if not own.empty:
-        sentences.append(f"AUROC minus that of the paper's score: {_listed(rows_of(own))}.")
+        told = ", ".join(difference(row) for row in rows_of(own))
+        sentences.append(f"AUROC minus that of the paper's score: {told}.")
     best = rows[rows.is_next_best]
     if not best.empty:
-        named = [f"{_listed([row])} over {detector_name(row.other)}" for row in rows_of(best)]
-        sentences.append(f"AUROC minus that of the best other detector: {', '.join(named)}.")
+        told = "; ".join(
+            f"{detector_name(str(other))} {', '.join(difference(row) for row in rows_of(part))}"
+            for other, part in best.groupby("other", sort=False)
+        )
+        sentences.append(f"AUROC minus that of the best other detector: {told}.")
     return sentences
 
 
@@ -76,38 +83,55 @@ def _interval(results: Results) -> str:
     return f"the {100 * results.config.evaluation.confidence:g} % interval"
 
 
-def _told(rows: Sequence[Any], *, numbers: bool) -> str:
-    """Return metrics with the strengths that they are told of, with numbers if asked for."""
-    by_metric: dict[str, list[Any]] = {}
+def by_metric(rows: Sequence[Any]) -> str:
+    """Return metrics with their strengths, and the largest difference of each with its interval."""
+    return ", ".join(_largest(metric, own) for metric, own in _grouped(rows).items())
+
+
+def metrics_at(rows: Sequence[Any]) -> str:
+    """Return metrics with their strengths alone."""
+    return ", ".join(f"{_name(m)}{_bracketed(_at(own))}" for m, own in _grouped(rows).items())
+
+
+def _grouped(rows: Sequence[Any]) -> dict[str, list[Any]]:
+    grouped: dict[str, list[Any]] = {}
     for row in rows:
-        by_metric.setdefault(row.metric, []).append(row)
-    return ", ".join(
-        f"{_metric_name(metric)} ({_listed(own)})" if numbers else _metric_at(metric, own)
-        for metric, own in by_metric.items()
-    )
+        grouped.setdefault(row.metric, []).append(row)
+    return grouped
 
 
-def _metric_name(metric: str) -> str:
+def _name(metric: str) -> str:
     return "the median delay" if metric in _LESS_IS_BETTER else METRIC_NAMES[metric]
 
 
-def _metric_at(metric: str, rows: Sequence[Any]) -> str:
+def _largest(metric: str, rows: Sequence[Any]) -> str:
+    largest = max(rows, key=lambda row: abs(row.difference))
+    if len(rows) == 1:
+        return f"{_name(metric)} ({difference(largest)})"
+    return f"{_name(metric)} ({_at(rows)}; at most {difference(largest)})"
+
+
+def _at(rows: Sequence[Any]) -> str:
     strengths = [strength_name(row.strength) for row in rows if pd.notna(row.strength)]
     if not strengths:
-        return _metric_name(metric)
-    noun = "strength" if len(strengths) == 1 else "strengths"
-    return f"{_metric_name(metric)} (at {noun} {', '.join(strengths)})"
+        return ""
+    return f"at {'strength' if len(strengths) == 1 else 'strengths'} {', '.join(strengths)}"
 
 
-def _listed(rows: Iterable[Any]) -> str:
-    return ", ".join(difference(row) for row in rows)
+def _bracketed(text: str) -> str:
+    return f" ({text})" if text else ""
 
 
 def difference(row: Any) -> str:
     """Return a pair's difference with its interval, unit and strength."""
     scale, unit = (100, "points") if row.metric in SHARES else (1, "s")
-    text = f"{scale * row.difference:+.2f}"
+    text = signed(scale * row.difference)
     if pd.notna(row.ci_low) and pd.notna(row.ci_high):
-        text += f" [{scale * row.ci_low:+.2f}, {scale * row.ci_high:+.2f}]"
+        text += f" [{signed(scale * row.ci_low)}, {signed(scale * row.ci_high)}]"
     at = "" if pd.isna(row.strength) else f" at strength {strength_name(row.strength)}"
     return f"{text} {unit}{at}"
+
+
+def signed(value: float) -> str:
+    """Return a number with its sign and two decimals, or one digit where that would be none."""
+    return f"{value:+.1g}" if 0 < abs(value) < 0.005 else f"{value:+.2f}"

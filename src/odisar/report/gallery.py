@@ -42,7 +42,7 @@ from odisar.report.figures.recordings import recordings_overview
 from odisar.report.figures.reliability import reliability_diagram
 from odisar.report.judged import has_events, has_false_alarm_hours
 from odisar.report.load import Results
-from odisar.report.picking import lead_time_note
+from odisar.report.picking import lead_time_note, left_out_note
 from odisar.report.style import save_figure
 
 _BEST = (
@@ -76,8 +76,8 @@ PLATES = (
         "Delay against false alarms",
         "effectiveness",
         "The median delay of alarms over all thresholds, against the false alarms that they cost; "
-        "markers with a dark rim are the operating points, set on calibration recordings. A curve "
-        f"ends where the median event is missed. {_BEST}",
+        "markers with a dark rim are the operating points, set on calibration recordings. Curve "
+        f"and marker are missing where the median event is missed. {_BEST}",
         delay_over_false_alarms,
         applies=has_false_alarm_hours,
     ),
@@ -117,6 +117,7 @@ PLATES = (
         "before, in and after the event count, as published.",
         quadrant_distribution,
         applies=has_quadrants,
+        note=left_out_note,
     ),
     Plate(
         "quadrant-scatter",
@@ -183,6 +184,7 @@ PLATES = (
         f"strength if there are several. {_CUT}",
         baselines_by_scenario,
         applies=has_groups,
+        note=left_out_note,
     ),
     Plate(
         "leakage",
@@ -226,6 +228,7 @@ PLATES = (
         "Which states the flagged windows blame, at the greatest strength if there are several.",
         attribution_shares,
         applies=has_flagged,
+        note=left_out_note,
     ),
     Plate(
         "guilty",
@@ -233,7 +236,7 @@ PLATES = (
         "events",
         "Where a fault was put on a known channel: how often that channel is blamed, with 95 % "
         "intervals, beside what naming states at random would reach. By what explains ODiSAR's "
-        "score, and as the paper does, by the error of reconstruction.",
+        "score, and as the paper does, by the error of reconstruction (of forecast states alone).",
         guilty_channel,
         applies=has_blame,
     ),
@@ -242,7 +245,7 @@ PLATES = (
         "Forecast error by step (from the study)",
         "events",
         "Root mean square error of forecasts of undisturbed test recordings by step, beside "
-        "simpler forecasters, from the study.",
+        "simpler forecasters, from the study. The commands of the horizon are unknown to all.",
         error_by_step,
         applies=has_forecasts,
     ),

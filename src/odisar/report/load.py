@@ -174,12 +174,20 @@ class Results:
         return self._result("nearness")
 
     def study(self, name: str) -> pd.DataFrame | None:
-        """Return a table of the study, or None where the study has not made it."""
-        path = study_folder(self.workspace.root) / f"{name}.csv"
-        return read_table(path) if path.is_file() else None
+        """Return a table of the study, or None where the study has not made it.
+
+        Some parts of the study write a file for each set-up; these come below one another.
+        """
+        folder = study_folder(self.workspace.root)
+        names = [name, *(f"{name}-{setup}" for setup in self.config.setups)]
+        paths = [folder / f"{known}.csv" for known in names]
+        parts = [read_table(path) for path in paths if path.is_file()]
+        return pd.concat(parts, ignore_index=True) if parts else None
 
     def _result(self, name: str) -> pd.DataFrame:
-        return read_table(self.workspace.results / f"{name}.csv")
+        """Return a result table; rows that two grouping columns with one value made are one."""
+        table = read_table(self.workspace.results / f"{name}.csv")
+        return table.drop_duplicates(ignore_index=True)
 
     @cached_property
     def splits(self) -> pd.DataFrame:

@@ -8,6 +8,9 @@ from odisar.report.detectors import TWIN_SCORES, alternatives
 from odisar.report.load import OVERALL, Results
 from odisar.report.style import strength_name
 
+#: More rows than these do not fit on a page.
+_DRAWN_SCENARIOS = 36
+
 
 @dataclass(frozen=True)
 class Value:
@@ -69,6 +72,27 @@ def shown_detectors(detection: pd.DataFrame, setup: str) -> list[str]:
     there = set(detection[detection.setup == setup].detector)
     best = best_alternative(detection, setup)
     return [name for name in TWIN_SCORES if name in there] + ([best] if best else [])
+
+
+def drawn_scenarios(results: Results, setup: str) -> pd.DataFrame:
+    """Return the scenarios that figures draw: without the finest groupings, if there are many.
+
+    Every combination of fault, size and channel is for tables, and for the heat map of faults.
+    """
+    scenarios = results.scenarios(setup)
+    while len(scenarios) > _DRAWN_SCENARIOS:
+        sizes = scenarios[~scenarios.is_apart & (scenarios.group != OVERALL)].group.value_counts()
+        if sizes.empty:
+            break
+        scenarios = scenarios[scenarios.group != sizes.index[0]]
+    return scenarios.reset_index(drop=True)
+
+
+def left_out_note(results: Results, setup: str) -> str:
+    """Say which groupings are in the tables alone; empty where all of them are drawn."""
+    everything, drawn = results.scenarios(setup), drawn_scenarios(results, setup)
+    left = [name for name in everything.group.unique() if name not in set(drawn.group)]
+    return f"Not drawn, but in the tables: groups by {', '.join(left)}." if left else ""
 
 
 def same_strength(rows: pd.DataFrame, strength: float) -> pd.DataFrame:

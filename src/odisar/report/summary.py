@@ -13,6 +13,14 @@ from odisar.report.load import Results
 from odisar.report.picking import at_strength, percent, pick, selection
 from odisar.report.style import METRIC_NAMES
 
+#: What every twin does, whatever the case.
+_METHOD = (
+    "A twin learns from undisturbed recordings to forecast the next sample and a horizon. The "
+    "score holds what it said about now against what is observed (the innovations), and how well "
+    "it reconstructs its own forecast; where that is rarer than on undisturbed recordings, the "
+    "machine is taken to be out of distribution. The paper's score is the reconstruction alone."
+)
+
 
 @dataclass(frozen=True)
 class Summary:
@@ -34,7 +42,7 @@ def summarise(results: Results) -> Summary:
     titles = {setup: setup_title(results, setup) for setup in results.setups}
     return Summary(
         gains=[told for setup in results.setups for told in transformer_gain(results, setup)],
-        lead=[_lead(results, case) for case in results.cases],
+        lead=[_METHOD, *(_lead(results, case) for case in results.cases)],
         found={title: _found(results, setup) for setup, title in titles.items()},
         certainty=certainty(results),
         failings={title: failings(results, setup) for setup, title in titles.items()},
@@ -58,12 +66,9 @@ def _lead(results: Results, case: str) -> str:
     known = known[known.setup == setup]
     noun = "blocks" if given.splits.kind == "cross-fit" else "recordings"
     return (
-        f"{given.title}: a twin trained on undisturbed recordings looks at the last "
-        f"{context_s:g} s and forecasts the next sample and the next {horizon_s:g} s. The score "
-        "holds what it said about now against what is observed (the innovations), and how well it "
-        "reconstructs its own forecast; where that is rarer than on undisturbed recordings, the "
-        "machine is taken to be out of distribution. The paper's score is the reconstruction "
-        f"alone. Tested on {_tested_on(known, noun)}, none of which the twin at test had seen."
+        f"{given.title}: the twin looks at the last {context_s:g} s and forecasts the next "
+        f"{horizon_s:g} s. It was tested on {_tested_on(known, noun)}, none of which the twin at "
+        "test had seen."
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from odisar.evaluation.metrics import auroc
 from odisar.report.figures.delays import course, delay_over_false_alarms
-from odisar.report.figures.onsets import envelope, score_around_onset
+from odisar.report.figures.onsets import envelope, score_around_onset, told_alarms
 from odisar.report.figures.ranking import pool_samples, roc_by_strength
 from odisar.report.judged import judged_recording, judged_recordings
 
@@ -88,10 +88,14 @@ def test_the_operating_point_is_marked_for_every_detector(results):
     assert marks[0].get_ydata()[0] == 15.0
 
 
-def test_alarms_are_drawn_at_the_onset(results):
+def test_alarms_are_counted_above_each_panel(results):
     figure = score_around_onset(results, "vessel-all")
-    told = [text.get_text() for axes in figure.axes for text in axes.texts]
-    assert told[0] == "1 of 1 events alarmed,\nhalf of them within 15 s"
+    assert figure.axes[0].get_title() == "strength 1\n1 of 1 alarmed,\np50 15 s"
+
+
+def test_a_median_event_without_alarm_has_no_delay():
+    delays = np.array([3.0, np.inf, np.inf])
+    assert told_alarms(delays) == "1 of 3 alarmed"
 
 
 def test_one_recording_is_the_same_alone(results, judged):

@@ -10,6 +10,7 @@ from odisar.report.figures.learning import tuning_trials
 from odisar.report.figures.quadrants import quadrant_distribution
 from odisar.report.figures.recordings import recordings_overview
 from odisar.report.gallery import PLATES, draw_figures
+from odisar.report.picking import drawn_scenarios, left_out_note
 from odisar.report.style import QUADRANTS, channel_label, save_figure
 
 from .altered import since_1970, with_faults, without_disturbed
@@ -171,3 +172,17 @@ def test_lead_times_of_a_narrowed_set_up_say_what_they_are_measured_against(resu
     drawn = draw_figures(results, tmp_path / "figures")
     noted = {item.path.stem for item in drawn if "maneuver random only" in item.caption}
     assert noted == {"operating-point-vessel-random"}
+
+
+def test_the_finest_groups_are_left_to_the_tables_and_that_is_said(results):
+    assert left_out_note(results, "vessel-all") == ""
+    everything = pd.DataFrame(
+        [("overall", "overall"), ("bias", "disturbance")]
+        + [(f"bias {n}, Yaw Rate", "fault_on") for n in range(40)],
+        columns=["evaluated_on", "group"],
+    ).assign(is_apart=False)
+    results.scenarios = lambda _setup: everything
+    assert list(drawn_scenarios(results, "vessel-all").evaluated_on) == ["overall", "bias"]
+    assert left_out_note(results, "vessel-all") == (
+        "Not drawn, but in the tables: groups by fault_on."
+    )

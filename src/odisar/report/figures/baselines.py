@@ -20,7 +20,7 @@ from odisar.report.detectors import (
     detector_name,
 )
 from odisar.report.load import OVERALL, Results
-from odisar.report.picking import same_strength
+from odisar.report.picking import drawn_scenarios, same_strength
 from odisar.report.style import METRIC_NAMES, figure_style, strength_name, with_strength
 
 METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
@@ -79,7 +79,7 @@ def _by_strength(
 
 def baselines_by_scenario(results: Results, setup: str) -> Figure:
     """Draw every detector's metrics in each scenario at the greatest strength (P2)."""
-    scenarios = results.scenarios(setup)
+    scenarios = drawn_scenarios(results, setup)
     names = list(scenarios[~scenarios.is_apart].evaluated_on)
     rows = _strongest(_rows(results.detection, setup, "P2"), results, setup)
     rows = rows[rows.evaluated_on.isin(names)]
@@ -132,7 +132,7 @@ def has_strengths(results: Results, setup: str) -> bool:
 
 def has_groups(results: Results, setup: str) -> bool:
     """Whether a set-up was judged by scenario."""
-    return len(results.scenarios(setup)) > 1
+    return int((~results.scenarios(setup).is_apart).sum()) > 1
 
 
 def _rows(table: pd.DataFrame, setup: str, protocol: str | None) -> pd.DataFrame:

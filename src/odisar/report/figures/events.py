@@ -16,6 +16,7 @@ from odisar.report.detectors import MONITOR
 from odisar.report.judged import judged_recording
 from odisar.report.load import Results, rows_of
 from odisar.report.ordering import fault_key
+from odisar.report.picking import drawn_scenarios
 from odisar.report.style import (
     EVENT_COLOUR,
     QUADRANT_COLOURS,
@@ -192,9 +193,10 @@ def attribution_shares(results: Results, setup: str) -> Figure:
     table = results.attribution[results.attribution.setup == setup]
     strongest = results.strengths(setup)[-1]
     same = table.strength.isna() if pd.isna(strongest) else table.strength == strongest
-    scenarios = results.scenarios(setup)
+    scenarios = drawn_scenarios(results, setup)
     apart = list(scenarios[scenarios.is_apart].evaluated_on)
     table = table[same | table.evaluated_on.isin(apart)]
+    table = table[table.evaluated_on.isin(scenarios.evaluated_on)]
     order = {name: place for place, name in enumerate(scenarios.evaluated_on)}
     table = table.assign(
         place=table.evaluated_on.map(order),

@@ -11,21 +11,21 @@ from odisar.report.load import Results
 from odisar.report.style import figure_style
 
 ALL_STATES, ALL_STEPS = "all", 0
-#: Whether the commands of the horizon were given to the forecasters.
-_UNKNOWN, _KNOWN = "unknown", "known-ahead"
+#: The commands of the horizon were not given to the forecasters.
+_UNKNOWN = "unknown"
 FORECASTER_NAMES = {
-    "twin": "twin",
-    "odisar": "twin",
-    "closed-form": "closed form",
+    "paper-transformer": "Transformer, paper's parameters",
+    "transformer": "Transformer, plain loss",
+    "weighed-transformer": "Transformer, weighed loss (the twin's)",
+    "residual-transformer": "Transformer on a closed form",
+    "closed-form": "closed form of the horizon",
     "persistence": "persistence",
     "constant-velocity": "constant velocity",
-    "last-state": "last state repeated",
-    "direct-linear": "linear, a step at a time",
     "gru": "GRU",
+    "patch-ts-mixer": "PatchTSMixer",
     "rnn": "LSTM",
     "vae": "VAE",
     "gan": "GAN",
-    "published-mixer": "published mixer",
 }
 # Okabe and Ito (2008), then Tol's muted scheme; markers and dashes besides.
 _COLOURS = (
@@ -51,10 +51,7 @@ def has_forecasts(results: Results, setup: str) -> bool:
 
 
 def error_by_step(results: Results, setup: str) -> Figure:
-    """Draw each forecaster's error over the steps ahead: all states (scaled), and each in its unit.
-
-    Raises OdisarError where the study has not judged forecasts.
-    """
+    """Draw each forecaster's error over the steps ahead: all states, and each in its unit."""
     table = forecasts_of(results, setup)
     states = sorted(table.state.unique(), key=lambda state: state != ALL_STATES)
     forecasters = list(dict.fromkeys(table.forecaster))
@@ -74,16 +71,21 @@ def error_by_step(results: Results, setup: str) -> Figure:
             axes.set_visible(False)
         figure.supxlabel("seconds ahead", fontsize=9)
         figure.supylabel("root mean square error", fontsize=9)
-        _legend(figure, table, forecasters)
+        _legend(figure, forecasters)
     return figure
 
 
 def forecasts_of(results: Results, setup: str) -> pd.DataFrame:
-    """Return a set-up's errors by single steps; empty where the study has none."""
+    """Return a set-up's errors by single steps.
+
+    Of forecasters that do not know the commands of the horizon, unless all of them do: that is how
+    the twin is run.
+    """
     table = results.study("forecast")
-    if table is None:
-        return pd.DataFrame(columns=["setup", "forecaster", "commands", "state", "step", "rmse"])
-    return table[(table.setup == setup) & (table.step != ALL_STEPS)]
+    assert table is not None  # noqa: S101 (has_forecasts has looked)
+    table = table[(table.setup == setup) & (table.step != ALL_STEPS)]
+    unknown = table[table.commands == _UNKNOWN]
+    return table if unknown.empty else unknown
 
 
 def forecaster_name(forecaster: str) -> str:
@@ -97,7 +99,7 @@ def _titled(state: str, units: dict[str, str]) -> str:
 
 def _lines(axes: Axes, rows: pd.DataFrame, forecasters: Sequence[str], step_s: float) -> None:
     physical = "rmse_physical" in rows and rows.rmse_physical.notna().all()
-    for (name, commands), own in rows.groupby(["forecaster", "commands"], sort=False):
+    for name, own in rows.groupby("forecaster", sort=False):
         place = forecasters.index(str(name))
         ordered = own.sort_values("step")
         errors = ordered.rmse_physical if physical else ordered.rmse
@@ -108,12 +110,11 @@ def _lines(axes: Axes, rows: pd.DataFrame, forecasters: Sequence[str], step_s: f
             marker=_MARKERS[place % len(_MARKERS)],
             markersize=3.5,
             linewidth=1.1,
-            linestyle=":" if commands == _KNOWN else "-",
             markevery=max(1, len(ordered) // 8),
         )
 
 
-def _legend(figure: Figure, table: pd.DataFrame, forecasters: Sequence[str]) -> None:
+def _legend(figure: Figure, forecasters: Sequence[str]) -> None:
     handles = [
         Line2D(
             [], [], color=_COLOURS[place % len(_COLOURS)], marker=_MARKERS[place % len(_MARKERS)],
@@ -121,6 +122,4 @@ def _legend(figure: Figure, table: pd.DataFrame, forecasters: Sequence[str]) -> 
         )
         for place, name in enumerate(forecasters)
     ]  # fmt: skip
-    if set(table.commands) >= {_UNKNOWN, _KNOWN}:
-        handles.append(Line2D([], [], color="black", ls=":", label="commands known ahead"))
-    figure.legend(handles=handles, loc="outside upper center", ncols=4)
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)

@@ -81,5 +81,8 @@ def leakage_panel(results: Results, setup: str) -> Figure:
 
 
 def _told(row: Any) -> str:
-    far = f",\n{row.share_of_iqr:.2g} IQR" if row.moved and np.isfinite(row.share_of_iqr) else ""
-    return f"moved {row.moved} of {row.positions}{far}"
+    told = f"moved {row.moved} of {row.positions}"
+    share = float(row.share_of_iqr)
+    if not row.moved or not np.isfinite(share):
+        return told
+    return f"{told},\n{share:.0f} IQR" if share >= 10 else f"{told},\n{share:.2g} IQR"

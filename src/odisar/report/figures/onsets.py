@@ -57,8 +57,9 @@ def score_around_onset(results: Results, setup: str) -> Figure:
                     recordings, detector, (-margin_s, lasts_s + margin_s), case.persistence_s
                 )
                 _draw(axes, found, detector, unit_s)
+                head = f"{name}\n" if detector == _DETECTORS[0] else ""
+                axes.set_title(f"{head}{told_alarms(found.delays_s)}", fontsize=8)
                 axes.axvspan(0, lasts_s / unit_s, color=EVENT_COLOUR, alpha=0.4, lw=0, zorder=0)
-            grid[0][column].set_title(name)
             grid[-1][column].set_xlabel(f"since onset [{unit}]")
         for axes in grid[:, 0]:
             axes.set_yscale("log")
@@ -115,15 +116,20 @@ def _draw(axes: Axes, found: Envelope, detector: str, unit_s: float) -> None:
     axes.plot(
         detected / unit_s, np.full(len(detected), 0.04), "|", color="black", ms=7, transform=bottom
     )
-    text = f"{len(detected)} of {len(found.delays_s)} events alarmed"
-    if 2 * len(detected) > len(found.delays_s):
-        middle_s = float(np.quantile(found.delays_s, 0.5, method="inverted_cdf"))
+    middle_s = _middle(found.delays_s)
+    if np.isfinite(middle_s):
         axes.axvline(middle_s / unit_s, color="black", linestyle="--", linewidth=0.8)
-        text += f",\nhalf of them within {round(middle_s, 1):g} s"
-    axes.text(
-        0.97, 0.1, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=7,
-        bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "boxstyle": "round,pad=0.15"},
-    )  # fmt: skip
+
+
+def told_alarms(delays_s: FloatArray) -> str:
+    """Return how many events raised an alarm, and the median delay if that is one of them."""
+    middle_s = _middle(delays_s)
+    text = f"{int(np.isfinite(delays_s).sum())} of {len(delays_s)} alarmed"
+    return f"{text},\np50 {round(middle_s, 1):g} s" if np.isfinite(middle_s) else text
+
+
+def _middle(delays_s: FloatArray) -> float:
+    return float(np.quantile(delays_s, 0.5, method="inverted_cdf"))
 
 
 def _legend(figure: Figure) -> None:

@@ -38,7 +38,7 @@ def paired_differences(results: Results, setup: str) -> Figure:
     shades = sns.color_palette("cividis_r", len(strengths) + 1)
     colours = [to_hex(shade) for shade in shades[1:]]
     with figure_style():
-        height = max(0.16 * len(strengths) + 0.1, 0.26) * len(others) + 1.5
+        height = max(0.11 * len(strengths) + 0.08, 0.26) * len(others) + 1.5
         figure = Figure(figsize=(9.6, height))
         grid = figure.subplots(1, len(_PANELS), sharey=True)
         for axes, (metric, meaning) in zip(grid, _PANELS.items(), strict=True):

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from odisar.report.load import Results
+from odisar.report.picking import drawn_scenarios
 from odisar.report.style import (
     QUADRANT_COLOURS,
     QUADRANT_HATCHES,
@@ -32,7 +33,8 @@ _DENSE = 0.6
 def quadrant_distribution(results: Results, setup: str) -> Figure:
     """Draw the share of windows in each quadrant, by scenario and strength (the paper's RQ2)."""
     table = results.quadrants[results.quadrants.setup == setup]
-    panels = _panels(table, list(results.scenarios(setup).evaluated_on))
+    scenarios = list(drawn_scenarios(results, setup).evaluated_on)
+    panels = _panels(table[table.evaluated_on.isin(scenarios)], scenarios)
     rows = panels[0].rows
     published = _published(table)
     columns = len(panels) + (published is not None)

@@ -47,6 +47,8 @@ def roc_by_strength(results: Results, setup: str) -> Figure:
         grid[0][0].set(xlim=(-0.02, 1), ylim=(0, 1.02))
         grid[1][0].set_xscale("log")
         grid[1][0].set_xlim(_SMALLEST_SHARE, 1)
+        # The last would meet the next panel's first.
+        grid[1][0].set_xticks([1e-3, 1e-2, 1e-1, 1], ["0.001", "0.01", "0.1", ""])
         figure.supylabel("share of disturbed samples above the threshold", fontsize=9)
         figure.supxlabel(
             "share of undisturbed samples above the threshold; below on a logarithmic axis",
@@ -56,8 +58,11 @@ def roc_by_strength(results: Results, setup: str) -> Figure:
             Line2D([], [], color=detector_look(d, detectors).colour, label=detector_name(d))
             for d in detectors
         ]
-        chance = Line2D([], [], color="#777777", ls=":", label="a coin")
-        figure.legend(handles=[*handles, chance], loc="outside upper center", ncols=3)
+        handles += [
+            Line2D([], [], color="#777777", ls=":", label="a coin"),
+            Line2D([], [], ls="", label="numbers: AUROC [%]"),
+        ]
+        figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure
 
 
@@ -101,5 +106,3 @@ def _areas(axes: Axes, samples: Pooled) -> None:
             fontsize=7.5,
             fontweight="bold",
         )
-    place = 0.04 + 0.085 * len(detectors)
-    axes.text(0.97, place, "AUROC [%]", transform=axes.transAxes, ha="right", fontsize=7.5)
