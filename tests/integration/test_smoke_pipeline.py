@@ -13,8 +13,9 @@ import pandas as pd
 import pytest
 from mlflow.tracking import MlflowClient
 
-from odisar.artifacts import Workspace
+from odisar.artifacts import Workspace, read_json
 from odisar.capability.assessment import assessment_schema
+from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.scoring import DETECTORS, Scorer
 from odisar.recordings.schema import Recording
 from odisar.recordings.store import read_store
@@ -106,7 +107,9 @@ def test_every_assessment_fits_the_schema_and_every_test_recording_has_some(work
 
 @pytest.mark.parametrize("setup", SETUPS)
 def test_the_trained_twin_is_causal(workspace, setup):
-    scorer = Scorer(read_twin(workspace.twin(setup)), 256, "cpu")
+    limits = read_json(workspace.thresholds(setup))["members"][setup]
+    fitted = InnovationScoreValues.model_validate(limits["innovation"]).build()
+    scorer = Scorer(read_twin(workspace.twin(setup)), 256, "cpu", fitted)
     recordings = read_store(workspace.recordings(CASES[setup]))
     recording = next(r for r in recordings if r.info.disturbance in ("case-3", "noise"))
     std = channel_std([recording])
