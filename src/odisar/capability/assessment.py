@@ -161,7 +161,7 @@ def blame_windows(
     parts = [np.empty((0, len(blamed_names(scorer.twin))))]
     for start, stop in scores.runs:
         own = windows[(windows >= start) & (windows < stop)]
-        directions = state_directions(scorer.twin, recording, scores.positions[own])
+        directions = state_directions(scorer.twin, recording, scores.positions[start:stop])
         innovations = scores.innovations[start:stop]
         parts.append(signatures.blame(innovations, own - start, directions))
     return np.concatenate(parts)

@@ -3,8 +3,8 @@
 At time t the forecast of x(t) that was made from samples up to t - 1 is compared with x(t): the
 innovation of state estimation (Bar-Shalom, Li and Kirubarajan, 2001, section 5.4). Two statistics
 of the last innovations look for two kinds of change: T2 of their mean (Hotelling, 1947) grows when
-they lean one way (a bias, a current), the mean of the log normalised innovation squared when they
-scatter more (noise). Their covariance comes from recordings that no weight was fitted to. Each
+they lean one way (a bias, a current), the size of the one that scatters most, given all others,
+when a sensor gets noisy. Their covariance comes from recordings that no weight was fitted to. Each
 statistic, and beside them the reconstruction error of the twin's own forecast (the paper's score),
 is put on the same scale, its log against what is usual on those recordings, and the largest one
 counts: a user need not know in advance which kind of change will come.
@@ -43,6 +43,15 @@ def moving_mean(values: FloatArray, steps: int) -> FloatArray:
 def squared_distance(values: FloatArray, precision: FloatArray) -> FloatArray:
     """Return (time,) squared Mahalanobis distances from zero of (time, feature) values."""
     return np.asarray(np.einsum("ti,ij,tj->t", values, precision, values))
+
+
+def conditional_squares(values: FloatArray, precision: FloatArray) -> FloatArray:
+    """Return (time, feature) squares of each feature given all others, in their variances.
+
+    The conditional terms of T2 (Mason, Tracy and Young, J. Quality Technology 1995): what a state
+    does that the others, which physics ties to it, do not account for.
+    """
+    return np.asarray((values @ precision) ** 2 / np.diag(precision))
 
 
 def fit_precision(values: FloatArray) -> FloatArray:
@@ -103,9 +112,11 @@ class MeanInnovation:
 
 @dataclass(frozen=True)
 class InnovationSize:
-    """Mean of log(1 + normalised innovation squared) over the last ``steps``.
+    """How much one state scatters: the largest, over states, of a mean over the last ``steps``.
 
-    The log keeps a single start or stop, which no twin forecasts, from ruling the mean.
+    The mean is of log(1 + square of the state's innovation given all others). Looked at one by
+    one, a noisy sensor is not diluted by those that are well; the log keeps a single start or
+    stop, which no twin forecasts, from ruling the mean.
     """
 
     steps: int
@@ -125,7 +136,8 @@ class InnovationSize:
 
     @staticmethod
     def _of(innovations: FloatArray, precision: FloatArray, steps: int) -> FloatArray:
-        return moving_mean(np.log1p(squared_distance(innovations, precision)), steps)
+        squares = np.log1p(conditional_squares(innovations, precision))
+        return np.asarray(moving_mean(squares, steps).max(axis=1))
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from odisar.evaluation.labels import label_active
 from odisar.evaluation.metrics import auroc, tnr_at_tpr95
 from odisar.recordings.schema import Recording
 from odisar.stages.members import Member, MemberData, load_member
-from odisar.study.statistics import exponential_mean, lead_errors, regime_distance
+from odisar.study.statistics import exponential_mean, lead_errors, log_sizes, regime_distance
 from odisar.twin.bundle import read_twin
 from odisar.twin.devices import pick_device
 
@@ -36,7 +36,7 @@ PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "study")
 
 #: Steps of the windows that are tried, and leads of forecasts that are compared with now.
 _WINDOWS, _LEADS = (1, 3, 5, 10, 20), (5, 10)
-_WEIGHTS = (0.1, 0.3)
+_WEIGHTS, _SIZES = (0.1, 0.3), (3, 5, 10)
 
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
@@ -55,27 +55,36 @@ def candidates() -> list[Candidate]:
     """Return every candidate, in the order of the table."""
     singles = [f"T2 of mean over {k}" for k in _WINDOWS]
     singles += [f"T2 of exponential mean, weight {a:g}" for a in _WEIGHTS]
-    singles += ["log NIS over 5", "log NIS over 10", "log NIS over 5, by regime"]
+    singles += [f"log NIS over {k}" for k in _SIZES] + ["log NIS over 5, by regime"]
+    singles += [f"size of one state over {k}" for k in _SIZES]
     singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in _LEADS]
     singles += [RECONSTRUCTION]
-    both = ("T2 of mean over 10", "log NIS over 5")
-    three, recent = (*both, RECONSTRUCTION), "T2 of mean over 3"
     made = [Candidate(name, 1, lambda s, n=name: s[n]) for name in singles]  # type: ignore[misc]
-    made += [
-        Candidate("larger of mean and size", 2, lambda s: _largest(s, both)),
-        Candidate("largest of mean, size, reconstruction", 3, lambda s: _largest(s, three)),
-        Candidate(
-            "largest of three, and recent (.7, .3)",
-            4,
-            lambda s: 0.7 * _largest(s, three) + 0.3 * s[recent],
-        ),
-        Candidate(
-            "largest of three, and recent (.5, .5)",
-            4,
-            lambda s: 0.5 * _largest(s, three) + 0.5 * s[recent],
-        ),
-    ]
+    for label, size in (("", "log NIS over 5"), (" of one state", "size of one state over 10")):
+        both = ("T2 of mean over 10", size)
+        made += _combined(label, both, (*both, RECONSTRUCTION))
     return made
+
+
+def _combined(label: str, both: tuple[str, ...], three: tuple[str, ...]) -> list[Candidate]:
+    """Return candidates that take the largest of several statistics, without and with recent ones.
+
+    Recent ones let go sooner when a disturbance has ended.
+    """
+    recent = ("T2 of mean over 3",)
+    sizes = ("T2 of mean over 3", "size of one state over 3")
+    name = f"largest of mean, size{label}, reconstruction"
+
+    def mixed(share: float, last: tuple[str, ...]) -> Callable[[Statistics], FloatArray]:
+        return lambda s: (1 - share) * _largest(s, three) + share * _largest(s, last)
+
+    return [
+        Candidate(f"larger of mean and size{label}", 2, lambda s: _largest(s, both)),
+        Candidate(name, 3, lambda s: _largest(s, three)),
+        Candidate(f"{name}; recent mean (.7, .3)", 4, mixed(0.3, recent)),
+        Candidate(f"{name}; recent mean (.5, .5)", 4, mixed(0.5, recent)),
+        Candidate(f"{name}; larger recent (.7, .3)", 5, mixed(0.3, sizes)),
+    ]
 
 
 def run(config: ConfigView, workspace: Workspace) -> None:
@@ -164,8 +173,9 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
         raw[f"T2 of mean over {steps}"] = _along(mean.statistic)
     for weight in _WEIGHTS:
         raw[f"T2 of exponential mean, weight {weight:g}"] = _along(_exponential(runs, weight))
-    for steps in (5, 10):
-        raw[f"log NIS over {steps}"] = _along(InnovationSize.fit(runs, steps).statistic)
+    for steps in _SIZES:
+        raw[f"log NIS over {steps}"] = _along(log_sizes(runs, steps))
+        raw[f"size of one state over {steps}"] = _along(InnovationSize.fit(runs, steps).statistic)
     by_regime = regime_distance(data, held_out)
     raw["log NIS over 5, by regime"] = lambda item, s: moving_mean(np.log1p(by_regime(item, s)), 5)
     for lead in _LEADS:

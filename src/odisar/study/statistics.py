@@ -31,6 +31,16 @@ def exponential_mean(values: FloatArray, weight: float) -> FloatArray:
     return np.asarray(lfilter([weight], [1.0, weight - 1.0], np.nan_to_num(values), axis=0))
 
 
+def log_sizes(runs: Sequence[FloatArray], steps: int) -> Callable[[FloatArray], FloatArray]:
+    """Return what makes (time,) means of the log normalised innovation squared, all states at once.
+
+    As the monitor's size of innovations, but not state by state; fitted on gapless ``runs`` (time,
+    state) of held-out innovations.
+    """
+    precision = fit_precision(np.concatenate(list(runs)))
+    return lambda run: moving_mean(np.log1p(squared_distance(run, precision)), steps)
+
+
 def lead_errors(
     data: MemberData, scorer: Scorer, held_out: Sequence[Recording], lead: int, steps: int
 ) -> Callable[[Recording, RecordingScores], FloatArray]:

@@ -13,9 +13,10 @@ from odisar.capability.innovations import InnovationScore, InnovationSteps
 from odisar.capability.scoring import InnovationScores, Scorer
 from odisar.capability.signatures import (
     Signatures,
+    alarm_starts,
     blamed_names,
-    lasting_response,
     state_directions,
+    step_response,
 )
 from odisar.config.loader import load_config
 from odisar.recordings.schema import Recording
@@ -175,19 +176,21 @@ def test_without_a_pose_a_state_is_its_own_feature(trained_twin):
     np.testing.assert_allclose(directions, [wanted, wanted])
 
 
-def test_a_lasting_shift_leaves_what_the_closed_form_does_not_carry_on(trained_twin):
+def test_a_step_leaves_what_the_closed_form_does_not_carry_on(trained_twin):
     network = copy.deepcopy(trained_twin.network)
     closed = network.next_closed_form
     closed.weights[closed.lags * len(CHANNELS) :] = 0.0  # products and squares are left aside
-    linear = replace(trained_twin, network=network)
+    response = step_response(replace(trained_twin, network=network))
+    assert len(response) == closed.lags + 1
     context = torch.zeros(1, SPEC.context_steps, len(CHANNELS))
-    for column, feature in enumerate(network.state_features):
-        shifted = context.clone()
-        shifted[..., feature] += 1.0
-        left = -(closed(shifted) - closed(context))[0].numpy()
-        left[column] += 1.0
-        np.testing.assert_allclose(lasting_response(linear)[:, column], left, atol=1e-6)
-    np.testing.assert_array_equal(lasting_response(linear), lasting_response(trained_twin))
+    for since in range(closed.lags + 1):
+        for column, feature in enumerate(network.state_features):
+            shifted = context.clone()
+            shifted[:, SPEC.context_steps - since :, feature] += 1.0
+            left = -(closed(shifted) - closed(context))[0].numpy()
+            left[column] += 1.0
+            np.testing.assert_allclose(response[since, :, column], left, atol=1e-6)
+    np.testing.assert_array_equal(response, step_response(trained_twin))
 
 
 def fitted_score(states: int = 2) -> InnovationScore:
@@ -195,35 +198,70 @@ def fitted_score(states: int = 2) -> InnovationScore:
     return InnovationScore.fit(runs, None, InnovationSteps(4, 3, 2, 0.0))
 
 
-def test_blame_for_a_lean_is_what_the_best_bias_of_a_state_takes_off_the_mean():
+def taken_away(innovations, signature, precision):
+    """Return how far the best size of a signature (time, feature) brings squared distances down."""
+    sizes = np.linspace(-20, 20, 40001)
+    left = innovations[None] - sizes[:, None, None] * signature[None]
+    distances = np.einsum("atf,fg,atg->a", left, precision, left)
+    return np.einsum("tf,fg,tg->", innovations, precision, innovations) - distances.min()
+
+
+def test_blame_is_what_the_best_fault_of_a_state_takes_off_the_mean_and_the_onset():
     score = fitted_score()
     innovations = generator(4, "lean").normal(size=(12, 2)) * 0.05 + [2.0, 0.1]
-    lasting = np.array([[0.5, 0.1], [0.0, 0.8]])
-    directions = np.array([[[1.0, 0.0], [0.0, 2.0]]])
+    response = np.array([np.eye(2), [[0.7, 0.2], [0.0, 0.9]], [[0.5, 0.1], [0.0, 0.8]]])
+    directions = np.broadcast_to([[1.0, 0.0], [0.0, 2.0]], (12, 2, 2))
     assert score.parts(innovations)[:, 9].argmax() == 0
-    found = Signatures(score, lasting).blame(innovations, np.array([9]), directions)[0]
-    mean, precision = innovations[6:10].mean(axis=0), score.mean.precision
-    sizes = np.linspace(-20, 20, 400001)
+    found = Signatures(score, response).blame(innovations, np.array([9]), directions)[0]
+    mean = innovations[6:10].mean(axis=0, keepdims=True)
     for state, direction in enumerate(directions[0]):
-        taken = []
-        for signature in (direction, lasting @ direction):
-            left = mean - sizes[:, None] * signature
-            distances = np.einsum("ai,ij,aj->a", left, precision, left)
-            taken.append(mean @ precision @ mean - distances.min())
-        assert found[state] == pytest.approx(np.sqrt(max(taken)), rel=1e-6)
+        lean = [
+            taken_away(mean, (end @ direction)[None], score.mean.precision)
+            for end in (response[0], response[-1])
+        ]
+        # The alarm began with the run: any of its samples may be the onset.
+        steps = [
+            taken_away(
+                innovations[at : min(at + 3, 10)],
+                (response @ direction)[: 10 - at],
+                score.size.precision,
+            )
+            for at in range(10)
+        ]
+        assert found[state] == pytest.approx(np.sqrt(max(lean) + max(steps)), rel=1e-5)
 
 
-def test_blame_for_scatter_is_what_a_state_takes_off_each_innovation():
+def test_the_onset_is_remembered_as_long_as_the_alarm_lasts_and_no_longer():
+    """What stays is the same for both states; the first sample is not."""
     score = fitted_score()
-    innovations = generator(4, "scatter").normal(size=(12, 2)) * [0.1, 0.1]
-    innovations[:, 0] += np.where(np.arange(12) % 2, 6.0, -6.0)
-    directions = np.array([[[1.0, 0.0], [0.0, 1.0]]])
-    assert score.parts(innovations)[:, 9].argmax() == 1
-    found = Signatures(score, np.eye(2)).blame(innovations, np.array([9]), directions)[0]
-    precision = score.size.precision
-    along = innovations[7:10] @ precision
-    wanted = np.sqrt((along**2 / np.diag(precision)).mean(axis=0))
-    np.testing.assert_allclose(found, wanted)
+    response = np.array([np.eye(2), *[[[1.0, 1.0], [1.0, 1.0]]] * 2])
+    directions = np.broadcast_to(np.eye(2), (60, 2, 2))
+    innovations = generator(4, "quiet").normal(size=(60, 2)) @ [[1.0, 0.5], [0.0, 0.3]] * 0.1
+    innovations[20] += [0.0, 6.0]
+    innovations[21:40] += [6.0, 6.0]
+    signatures = Signatures(score, response)
+    during = signatures.blame(innovations, np.array([24, 30, 39]), directions)
+    assert (during[:, 1] > 1.1 * during[:, 0]).all()
+    assert signatures.blame(innovations, np.array([58]), directions).max() < during.max() / 10
+
+
+def test_blame_knows_nothing_of_what_comes_later():
+    score, windows = fitted_score(), np.arange(4, 20)
+    signatures = Signatures(score, np.array([np.eye(2)] * 4) * 0.5)
+    innovations = generator(4, "later").normal(size=(40, 2))
+    directions = np.broadcast_to(np.eye(2), (40, 2, 2))
+    whole = signatures.blame(innovations, windows, directions)
+    innovations[20:] += 100.0
+    np.testing.assert_array_equal(signatures.blame(innovations, windows, directions), whole)
+    cut = signatures.blame(innovations[:20], windows, directions[:20])
+    np.testing.assert_allclose(cut, whole)
+
+
+def test_an_alarm_goes_on_over_a_short_gap():
+    rare = np.zeros(16, dtype=bool)
+    rare[[3, 5, 6, 12]] = True
+    expected = [0, 1, 2, 3, 3, 3, 3, 3, 3, 9, 10, 11, 12, 12, 12, 15]
+    assert alarm_starts(rare, 2).tolist() == expected
 
 
 def test_after_a_gap_blame_begins_anew(scorer):

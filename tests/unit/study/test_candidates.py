@@ -67,8 +67,10 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
     [
         ("larger of mean and size", 2, [3, 5, 2]),
         ("largest of mean, size, reconstruction", 3, [3, 5, 9]),
-        ("largest of three, and recent (.7, .3)", 4, [5.1, 6.5, 9.3]),
-        ("largest of three, and recent (.5, .5)", 4, [6.5, 7.5, 9.5]),
+        ("largest of mean, size, reconstruction; recent mean (.7, .3)", 4, [5.1, 6.5, 9.3]),
+        ("largest of mean, size, reconstruction; recent mean (.5, .5)", 4, [6.5, 7.5, 9.5]),
+        ("largest of mean, size, reconstruction; larger recent (.7, .3)", 5, [5.7, 6.5, 9.3]),
+        ("larger of mean and size of one state", 2, [4, 5, 2]),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -77,6 +79,8 @@ def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
         SIZE: np.array([3.0, 1.0, 1.0]),
         REBUILT: np.array([2.0, 2.0, 9.0]),
         RECENT: np.full(3, 10.0),
+        "size of one state over 3": np.array([12.0, 1.0, 1.0]),
+        "size of one state over 10": np.array([4.0, 1.0, 1.0]),
     }
     one = next(one for one in candidates() if one.name == name)
     assert one.parts == parts
