@@ -37,9 +37,9 @@ def blame_table(assessed: pd.DataFrame, cfg: Judging, base_seed: int) -> pd.Data
     """Return how often the guilty channel comes first, and among the first three.
 
     ``assessed`` has a row for each assessed window, with setup, recording, base_seed, fault,
-    guilty (the channel that a fault was put on, empty where none was), is_disturbed, candidates
-    and rebuilt_candidates (how many states could be named), and for each of ``ATTRIBUTIONS``
-    three columns of named states, empty unless its score was above its threshold. Only flagged
+    guilty (the channel that a fault was put on, empty where none was), is_disturbed, and for
+    each of ``ATTRIBUTIONS`` three columns of named states, empty unless its score was above its
+    threshold, and its chance (``named_by_chance``). Only flagged
     windows inside of a fault count: on others nothing is blamed. ``chance`` is what naming states
     at random would reach. Intervals are over recordings that vary together.
     """
@@ -60,12 +60,16 @@ def blame_table(assessed: pd.DataFrame, cfg: Judging, base_seed: int) -> pd.Data
                 "windows": len(part),
                 "recordings": part.recording.nunique(),
             }
-            column = "candidates" if attribution == "odisar" else "rebuilt_candidates"
             for top in (1, 3):
                 row |= _hits(part, prefix, top, resampler)
-                row[f"chance_{top}"] = float(np.minimum(1.0, top / part[column]).mean())
+                row[f"chance_{top}"] = float(np.minimum(1.0, top * part[f"{prefix}_chance"]).mean())
             rows.append(row)
     return pd.DataFrame(rows, columns=list(BLAME_COLUMNS))
+
+
+def named_by_chance(guilty: str, states: Sequence[str]) -> float:
+    """Return how often naming one state at random names the guilty one: never, if it isn't there."""
+    return 1.0 / len(states) if _names(states, guilty) else 0.0
 
 
 def _cells(flagged: pd.DataFrame) -> Iterator[tuple[str, str, str, pd.DataFrame]]:

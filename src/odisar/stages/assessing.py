@@ -15,6 +15,7 @@ from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.scoring import Scorer
 from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
+from odisar.evaluation.blame import named_by_chance
 from odisar.evaluation.cells import metadata_columns
 from odisar.evaluation.reliability import RecordingForecasts
 from odisar.evaluation.scored import ScoredRecording
@@ -162,7 +163,7 @@ def evaluate_member(job: Job) -> MemberResult:
 def _assessed_row(
     setup: str, item: Recording, case: Case, assessment: Assessment
 ) -> dict[str, object]:
-    info = item.info
+    info, guilty = item.info, _guilty(item, case)
     issued = item.time_s[[assessment.start_time_step - 1]]
     return {
         "setup": setup,
@@ -175,9 +176,9 @@ def _assessed_row(
         **_named("state", assessment.state_attribution),
         **_named("rebuilt_state", assessment.reconstruction_attribution),
         "fault": info.column("fault") or f"{info.disturbance} {info.column('strength')}".strip(),
-        "guilty": _guilty(item, case),
-        "candidates": len(case.blamed_names),
-        "rebuilt_candidates": len(case.output_names),
+        "guilty": guilty,
+        "state_chance": named_by_chance(guilty, case.blamed_names),
+        "rebuilt_state_chance": named_by_chance(guilty, case.output_names),
     }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from odisar.evaluation.blame import ANY, ATTRIBUTIONS, BLAME_COLUMNS, blame_table
+from odisar.evaluation.blame import ANY, ATTRIBUTIONS, BLAME_COLUMNS, blame_table, named_by_chance
 
 from .evaluation_cases import CONFIG
 
@@ -20,8 +20,8 @@ def window(guilty, named, rebuilt=NOBODY, **changes):
         "fault": "bias",
         "guilty": guilty,
         "is_disturbed": True,
-        "candidates": 4,
-        "rebuilt_candidates": 2,
+        "state_chance": 1 / 4,
+        "rebuilt_state_chance": 1 / 2,
     }
     for prefix, names in (("state", named), ("rebuilt_state", rebuilt)):
         row |= {f"{prefix}_{i}": name for i, name in enumerate(names, start=1)}
@@ -92,7 +92,7 @@ def test_each_attribution_is_judged_by_its_own_names():
 def test_chance_is_that_of_naming_at_random():
     table = table_of(
         window("u", ("u", "v", "r"), ("u", "v", "")),
-        window("u", ("v", "r", "u"), ("u", "v", ""), candidates=10),
+        window("u", ("v", "r", "u"), ("u", "v", ""), state_chance=1 / 10),
     )
     row, rebuilt = cell(table), cell(table, "reconstruction")
     assert row.chance_1 == pytest.approx((1 / 4 + 1 / 10) / 2)
@@ -157,3 +157,9 @@ def test_nothing_to_judge_leaves_an_empty_table_with_its_columns():
     table = table_of(window("", ("u", "v", "r")))
     assert table.empty
     assert tuple(table.columns) == BLAME_COLUMNS
+
+
+def test_who_can_not_be_named_is_named_by_no_chance():
+    assert named_by_chance("u", ["u", "v"]) == 1 / 2
+    assert named_by_chance("oz", ["x", "y", "oz / ow"]) == pytest.approx(1 / 3)
+    assert named_by_chance("u", ["x", "y"]) == 0.0
