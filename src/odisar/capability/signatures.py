@@ -104,7 +104,8 @@ class Signatures:
         mean = self.score.mean
         means = moving_mean(innovations, mean.steps)[windows]
         ends = [directions @ response.T for response in (self.response[0], self.response[-1])]
-        return np.max([_explained(means, end, mean.precision) for end in ends], axis=0)
+        explained = [_explained(means, end, mean.precision) for end in ends]
+        return np.asarray(np.max(explained, axis=0))
 
     def _of_onset(
         self, innovations: FloatArray, windows: NDArray[np.int64], directions: FloatArray

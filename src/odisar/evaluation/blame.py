@@ -68,7 +68,7 @@ def blame_table(assessed: pd.DataFrame, cfg: Judging, base_seed: int) -> pd.Data
 
 
 def named_by_chance(guilty: str, states: Sequence[str]) -> float:
-    """Return how often naming one state at random names the guilty one: never, if it isn't there."""
+    """Return how often one state named at random is the guilty one: never, if it is not there."""
     return 1.0 / len(states) if _names(states, guilty) else 0.0
 
 
