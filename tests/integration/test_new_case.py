@@ -1,73 +1,21 @@
 """A stranger's recordings become a profile that can be run, and what is wrong with them is said."""
 
 import re
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 from ruamel.yaml import YAML
 
-from odisar.cli import main
 from odisar.config.loader import load_config
 from odisar.recordings.reader import read_case
 from odisar.workspaces import lay_out
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from .strangers import rover, run, write_rovers
+
 pytestmark = pytest.mark.usefixtures("root")
-
-
-@pytest.fixture
-def root(tmp_path, monkeypatch):
-    """A project that a command can run in and that a profile can be laid out from."""
-    project = tmp_path / "project"
-    project.mkdir()
-    for name in ("params.yaml", "dvc.yaml", ".dvcignore"):
-        shutil.copyfile(ROOT / name, project / name)
-    for name in ("src", "notebooks"):
-        (project / name).mkdir()
-    monkeypatch.chdir(project)
-    return project
-
-
-@pytest.fixture
-def folder(tmp_path):
-    path = tmp_path / "Prüffahrten 2024"
-    path.mkdir()
-    return path
-
-
-def rover(seed, samples=700, rate_hz=4.0):
-    """A rover that turns as it is steered, logged by someone with other habits."""
-    random = np.random.default_rng(seed)
-    command = np.repeat(random.uniform(-30, 30, samples // 24 + 1), 24)[:samples]
-    turn = np.convolve(command, np.exp(-np.arange(20) / 4) / 4)[:samples]
-    return pd.DataFrame(
-        {
-            "Nr": np.arange(samples),
-            "Zeit [s]": np.arange(samples) / rate_hz,
-            "Lenkwinkel Soll [°]": command,
-            "v [m/s]": 1.5 - abs(turn) / 80 + 0.02 * random.normal(size=samples),
-            "yaw rate [deg/s]": turn + 0.5 * random.normal(size=samples),
-            "mode": "AUTO",
-        }
-    )
-
-
-def write_rovers(folder, files=12, **options):
-    for seed in range(files):
-        rover(seed).to_csv(
-            folder / f"Fahrt {seed}.csv", sep=";", decimal=",", index=False, **options
-        )
-
-
-def run(*arguments):
-    return main([str(argument) for argument in arguments])
 
 
 def test_a_table_with_semicolons_and_decimal_commas_becomes_a_profile_that_runs(
@@ -143,98 +91,6 @@ def test_one_long_parquet_with_jitter_a_gap_and_a_pose(root, folder, capsys):
     assert {"x", "y"} <= set(case.output_names)
     assert "yaw" not in case.output_names
     assert not {"x", "y", "yaw"} & set(case.faults.channels)
-
-
-STORE = get_typestore(Stores.ROS2_HUMBLE)
-
-
-def write_bag(path, seed, seconds=60.0, unstamped=0):
-    """Write odometry at 50 Hz and an inertial sensor at 100 Hz, as a robot's recorder does."""
-    kinds = STORE.types
-    vector, point = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Point"]
-    random = np.random.default_rng(seed)
-    yaw = x = y = turn = 0.0
-
-    def header(nanoseconds):
-        stamp = kinds["builtin_interfaces/msg/Time"](
-            sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9
-        )
-        return kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
-
-    def around(z):
-        return vector(*(float(0.01 * value) for value in random.normal(size=2)), z=z)
-
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        odometry = writer.add_connection("/odom", "nav_msgs/msg/Odometry", typestore=STORE)
-        imu = writer.add_connection("/imu/data", "sensor_msgs/msg/Imu", typestore=STORE)
-        for i in range(round(100 * seconds)):
-            at = 1_700_000_000_000_000_000 + i * 10_000_000
-            turn = 0.98 * turn + 0.05 * random.normal()
-            yaw, x, y = yaw + turn / 100, x + np.cos(yaw) / 200, y + np.sin(yaw) / 200
-            facing = kinds["geometry_msgs/msg/Quaternion"](
-                x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2))
-            )
-            stamp = 0 if i < unstamped else at
-            measured = kinds["sensor_msgs/msg/Imu"](
-                header(stamp),
-                facing,
-                np.zeros(9),
-                around(turn),
-                np.zeros(9),
-                around(9.8),
-                np.zeros(9),
-            )
-            raw = STORE.serialize_cdr(measured, "sensor_msgs/msg/Imu")
-            writer.write(imu, at, raw)
-            if i % 2:
-                continue
-            pose = kinds["geometry_msgs/msg/Pose"](point(float(x), float(y), 0.0), facing)
-            twist = kinds["geometry_msgs/msg/Twist"](around(0.0), around(turn))
-            moved = kinds["nav_msgs/msg/Odometry"](
-                header(at),
-                "base",
-                kinds["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
-                kinds["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
-            )
-            writer.write(odometry, at, STORE.serialize_cdr(moved, "nav_msgs/msg/Odometry"))
-
-
-def test_every_bag_of_a_folder_of_bad_ones_is_told(folder, capsys):
-    for name in "abcd":
-        (folder / f"{name}.mcap").write_text("x" if name != "c" else "")
-    assert run("new-case", folder) == 1
-    error = capsys.readouterr().err
-    assert "none of the 4 recordings can be read" in error
-    for name in "abd":
-        assert re.search(rf"^{name}\.mcap +{name}\.mcap is cut off or damaged", error, re.MULTILINE)
-    assert re.search(r"^c\.mcap +the file is empty +record it again", error, re.MULTILINE)
-
-
-def test_bags_are_read_by_their_odometry(root, folder, capsys):
-    for seed in range(2):
-        write_bag(folder / f"run_{seed}", seed)
-    assert run("new-case", folder, "--name", "base", "--write") == 0
-    assert "2 recordings, 2 of them sound" in capsys.readouterr().err
-    case = load_config(lay_out(root, "base")).cases["base"]
-    bag = case.source.bag
-    assert (bag.stamp_topic, bag.stamp) == ("/odom", "header")
-    assert bag.fields["position_x"] == "/odom:pose.pose.position.x"
-    assert bag.fields["linear_acceleration_x"] == "/imu/data:linear_acceleration.x"
-    assert "position_z" not in bag.fields
-    assert (case.rate_hz, case.source.resample) == (10.0, "thin")
-    assert case.pose.heading == ["orientation_z", "orientation_w"]
-    units = {channel.name: channel.unit for channel in case.channels}
-    assert units["angular_velocity_z"] == "rad/s"
-    assert units["position_x"] == "m"
-
-
-def test_some_headers_without_a_stamp_make_the_time_of_receipt_the_clock(root, folder, capsys):
-    write_bag(folder / "run_0", 0, unstamped=3)
-    assert run("new-case", folder, "--name", "base", "--write") == 0
-    printed = capsys.readouterr()
-    assert "the header's stamp is 0 in messages of /imu/data" in printed.out
-    assert "1 recording, 1 of them sound" in printed.err
-    assert load_config(lay_out(root, "base")).cases["base"].source.bag.stamp == "received"
 
 
 def test_a_window_chosen_on_the_command_line_is_proposed(folder, capsys):
@@ -328,44 +184,6 @@ def test_a_file_or_a_missing_folder_is_named(folder, capsys):
     assert "is a file; give the folder" in capsys.readouterr().err
     assert run("new-case", folder / "nowhere") == 1
     assert "there is no such folder" in capsys.readouterr().err
-
-
-def test_inspect_finds_the_profile_by_its_folder_and_names_every_error(folder, capsys):
-    write_rovers(folder, files=4)
-    assert run("new-case", folder, "--name", "rover", "--write") == 0
-    capsys.readouterr()
-    assert run("inspect", folder) == 0
-    text = capsys.readouterr().out
-    assert "read as profile rover says" in text
-    assert "4 of 4 recordings can be used" in text
-    assert re.search(r"v \[m/s\] +m/s +forecast", text)
-    lines = (folder / "Fahrt 1.csv").read_text().splitlines(keepends=True)
-    lines[6] = lines[6].replace(lines[6].split(";")[3], "")
-    (folder / "Fahrt 1.csv").write_text("".join(lines))
-    (folder / "Fahrt 2.csv").write_bytes(b"")
-    (folder / "lost.csv").symlink_to("/nowhere")
-    (folder / "folder.csv").mkdir()
-    assert run("inspect", folder, "--profile", "rover") == 1
-    text = capsys.readouterr().out
-    assert re.search(r"error +Fahrt 1\.csv +7 +v \[m/s\] +the value is missing", text)
-    assert re.search(r"error +Fahrt 2\.csv +the file is empty", text)
-    assert "a folder has the name" in text
-    assert "2 of 6 recordings can be used" in text
-    assert max(map(len, text.splitlines())) <= 120
-
-
-def test_inspect_without_a_case_takes_what_would_be_proposed(folder, capsys):
-    write_rovers(folder, files=4)
-    assert run("inspect", folder) == 0
-    assert "`odisar new-case` would propose" in capsys.readouterr().out
-
-
-def test_inspect_as_a_case_that_does_not_fit_says_what_is_missing(folder, capsys):
-    write_rovers(folder, files=1)
-    assert run("inspect", folder, "--case", "gunnerus") == 1
-    assert "the column is missing" in capsys.readouterr().out
-    assert run("inspect", folder, "--case", "mine") == 1
-    assert "case 'mine' is not declared" in capsys.readouterr().err
 
 
 def test_many_files_are_all_checked_though_few_are_looked_at(folder, capsys):

@@ -9,11 +9,12 @@ from odisar.config.learning import DropoutRate
 
 
 class FitConfig(Section):
-    """How long the alternatives that are networks are trained: steps of so many windows."""
+    """How long networks are fitted: steps of so many windows; see ``fitting.FitBudget``."""
 
     steps: PositiveInt
     batch_size: PositiveInt
     learning_rate: PositiveFloat
+    gradient_clip: PositiveFloat
     validations: PositiveInt
 
 

@@ -55,15 +55,17 @@ def disturbed_cells(descriptions: Sequence[Description], groups: Groups) -> list
     Strengths are never pooled: every cell exists once for each strength among its recordings. The
     recordings ``apart`` obey ``overall`` in every column but the one that sets them apart, as far
     as they have a value there.
+
+    A group is named by its value. Where two columns share a value over the same recordings they
+    are one group; over others the later group is named "value (column)" (see ``cell_name``).
     """
     disturbed = [i for i, d in enumerate(descriptions) if is_disturbed(d)]
     clean = [i for i, d in enumerate(descriptions) if not is_disturbed(d)]
     overall = [i for i in disturbed if _is_overall(descriptions[i], groups)]
-    cells = _split(descriptions, OVERALL, overall)
+    pools = {OVERALL: overall}
     for column in groups.group_by:
         for value in _values(descriptions, column):
-            chosen = [i for i in overall if descriptions[i][column] == value]
-            cells += _split(descriptions, value, chosen)
+            _pool(pools, column, value, [i for i in overall if descriptions[i][column] == value])
     for column in groups.apart:
         alike = [
             i for i in disturbed if _is_overall(descriptions[i], groups, but=column, passing=("",))
@@ -72,29 +74,38 @@ def disturbed_cells(descriptions: Sequence[Description], groups: Groups) -> list
             if value not in groups.overall.get(column, []):
                 chosen = [i for i in alike if descriptions[i][column] == value]
                 chosen += clean if value in groups.with_clean else []
-                cells += _split(descriptions, value, chosen)
-    return cells
+                _pool(pools, column, value, chosen)
+    return [cell for name, chosen in pools.items() for cell in _split(descriptions, name, chosen)]
 
 
 def clean_cells(descriptions: Sequence[Description], groups: Groups) -> list[Cell]:
     """Return the cells over undisturbed recordings: overall, and by group where they differ.
 
     ``overall`` narrows them too, but not by columns that say what disturbs (which is nothing).
+    Groups are named as in ``disturbed_cells``.
     """
     clean = [
         i
         for i, d in enumerate(descriptions)
         if not is_disturbed(d) and _is_overall(d, groups, passing=("", UNDISTURBED))
     ]
-    if not clean:
-        return []
-    cells = [Cell(OVERALL, None, np.array(clean))]
+    pools = {OVERALL: clean}
     for column in groups.group_by:
         for value in _values(descriptions, column):
-            members = [i for i in clean if descriptions[i][column] == value]
-            if members:
-                cells.append(Cell(value, None, np.array(members)))
-    return cells
+            _pool(pools, column, value, [i for i in clean if descriptions[i][column] == value])
+    return [Cell(name, None, np.array(members)) for name, members in pools.items() if members]
+
+
+def cell_name(column: str, value: str) -> str:
+    """Return the name of a group whose value alone is the name of another group."""
+    return f"{value} ({column})"
+
+
+def _pool(pools: dict[str, list[int]], column: str, value: str, chosen: list[int]) -> None:
+    """Add a group, if it has recordings, under a name that no other recordings have."""
+    if chosen:
+        name = value if pools.get(value, chosen) == chosen else cell_name(column, value)
+        pools[name] = chosen
 
 
 def _is_overall(

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
-from odisar.forecasters.fitting import FittingPlan, NetworkForecaster
+from odisar.fitting import FitBudget
 from odisar.forecasters.interface import WindowShape
+from odisar.forecasters.network_forecaster import NetworkForecaster
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ class GruNetwork(nn.Module):
 class GruForecaster(NetworkForecaster):
     """A GRU fitted to the squared error of the horizon."""
 
-    def __init__(self, size: GruSize, plan: FittingPlan) -> None:
-        super().__init__(plan)
+    def __init__(self, size: GruSize, budget: FitBudget, seed: int) -> None:
+        super().__init__(budget, seed)
         self._size = size
 
     def build(self, shape: WindowShape) -> nn.Module:

@@ -11,8 +11,9 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
-from odisar.forecasters.fitting import FittingPlan, NetworkForecaster, Objective
+from odisar.fitting import FitBudget
 from odisar.forecasters.interface import WindowShape
+from odisar.forecasters.network_forecaster import NetworkForecaster, Objective
 from odisar.windows.windowing import Batch
 
 
@@ -53,8 +54,8 @@ class RnnNetwork(nn.Module):
 class RnnForecaster(NetworkForecaster):
     """An LSTM fitted to the squared error of the horizon."""
 
-    def __init__(self, size: RnnSize, plan: FittingPlan) -> None:
-        super().__init__(plan)
+    def __init__(self, size: RnnSize, budget: FitBudget, seed: int) -> None:
+        super().__init__(budget, seed)
         self._size = size
 
     def build(self, shape: WindowShape) -> nn.Module:
@@ -138,8 +139,8 @@ class VaeNetwork(Generator):
 class VaeForecaster(NetworkForecaster):
     """A conditional VAE; its forecast is that of the prior's centre."""
 
-    def __init__(self, size: GenerativeSize, plan: FittingPlan) -> None:
-        super().__init__(plan)
+    def __init__(self, size: GenerativeSize, budget: FitBudget, seed: int) -> None:
+        super().__init__(budget, seed)
         self._size = size
 
     def build(self, shape: WindowShape) -> nn.Module:
@@ -197,8 +198,8 @@ class GanObjective:
 class GanForecaster(NetworkForecaster):
     """A conditional GAN with the squared error in its loss; its forecast has latent zeros."""
 
-    def __init__(self, size: GenerativeSize, plan: FittingPlan) -> None:
-        super().__init__(plan)
+    def __init__(self, size: GenerativeSize, budget: FitBudget, seed: int) -> None:
+        super().__init__(budget, seed)
         self._size = size
 
     def build(self, shape: WindowShape) -> nn.Module:
@@ -207,4 +208,4 @@ class GanForecaster(NetworkForecaster):
 
     def objective(self, shape: WindowShape) -> Objective:
         """Return a loss with a fresh critic."""
-        return GanObjective(self._size, shape, self.plan.learning_rate)
+        return GanObjective(self._size, shape, self.budget.learning_rate)

@@ -16,8 +16,9 @@ import torch
 from torch import nn
 
 from odisar.errors import OdisarError
-from odisar.forecasters.fitting import FittingPlan, NetworkForecaster
+from odisar.fitting import FitBudget
 from odisar.forecasters.interface import WindowShape
+from odisar.forecasters.network_forecaster import NetworkForecaster
 
 _LIBRARY = "transformers"
 
@@ -75,8 +76,8 @@ class MixerNetwork(nn.Module):
 class MixerForecaster(NetworkForecaster):
     """PatchTSMixer fitted to the squared error of the horizon."""
 
-    def __init__(self, size: MixerSize, plan: FittingPlan) -> None:
-        super().__init__(plan)
+    def __init__(self, size: MixerSize, budget: FitBudget, seed: int) -> None:
+        super().__init__(budget, seed)
         self._size = size
 
     def build(self, shape: WindowShape) -> nn.Module:

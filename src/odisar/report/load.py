@@ -14,6 +14,7 @@ from odisar.config.cases import Case
 from odisar.config.judging import Judging
 from odisar.config.loader import PARAMS_FILE, ConfigView, load_config
 from odisar.errors import OdisarError
+from odisar.evaluation.cells import cell_name
 from odisar.recordings.quality import read_quality_table
 from odisar.report.detectors import ORACLE
 from odisar.report.ordering import ordered_values
@@ -185,9 +186,7 @@ class Results:
         return pd.concat(parts, ignore_index=True) if parts else None
 
     def _result(self, name: str) -> pd.DataFrame:
-        """Return a result table; rows that two grouping columns with one value made are one."""
-        table = read_table(self.workspace.results / f"{name}.csv")
-        return table.drop_duplicates(ignore_index=True)
+        return read_table(self.workspace.results / f"{name}.csv")
 
     @cached_property
     def splits(self) -> pd.DataFrame:
@@ -271,8 +270,8 @@ class Results:
     def scenarios(self, setup: str) -> pd.DataFrame:
         """Return what a set-up was judged on: ``evaluated_on``, ``group`` and ``is_apart``.
 
-        ``group`` is the metadata column whose value the scenario is, in the case's order; what is
-        judged apart comes last.
+        ``group`` is the metadata column whose value the scenario is, in the case's order, the first
+        where columns share it; what is judged apart comes last.
         """
         groups = self.case_of(setup).groups
         known = self.examples.recordings
@@ -282,13 +281,14 @@ class Results:
         for column in dict.fromkeys([*groups.group_by, *groups.apart]):
             rows += [
                 {
-                    "evaluated_on": value,
+                    "evaluated_on": name,
                     "group": column,
                     "is_apart": column in groups.apart
                     and value not in groups.overall.get(column, []),
                 }
                 for value in ordered_values(known, column)
-                if value in judged and value != OVERALL
+                for name in (value, cell_name(column, value))
+                if name in judged and name != OVERALL
             ]
         scenarios = pd.DataFrame(rows).drop_duplicates("evaluated_on")
         return scenarios.sort_values("is_apart", kind="stable", ignore_index=True)

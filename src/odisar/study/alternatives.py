@@ -6,11 +6,10 @@ from pathlib import Path
 
 from odisar.artifacts import Workspace, write_json
 from odisar.baselines.interface import Detector
-from odisar.baselines.neural.fitting import FitBudget
 from odisar.baselines.neural.registry import NOT_DEPLOYABLE, neural_detectors
 from odisar.baselines.registry import optional_detectors
 from odisar.config.loader import ConfigView
-from odisar.config.study import FitConfig
+from odisar.fitting import FitBudget
 from odisar.stages.detectors import member_reference
 from odisar.stages.members import Member, load_member
 from odisar.stages.parallel import run_jobs
@@ -32,18 +31,13 @@ class _Job:
     names: tuple[str, ...]
 
 
-def budget_of(fit: FitConfig) -> FitBudget:
-    """Return how long the networks among the alternatives are trained."""
-    return FitBudget(fit.steps, fit.batch_size, fit.learning_rate, fit.validations)
-
-
 def all_alternatives(config: ConfigView) -> dict[str, Callable[[], Detector]]:
     """Return what makes each alternative of the study, by name."""
     optional: dict[str, Callable[[], Detector]] = {
         name: lambda name=name: optional_detectors()[name]  # type: ignore[misc]
         for name in optional_detectors()
     }
-    return optional | neural_detectors(budget_of(config.study.detectors))
+    return optional | neural_detectors(FitBudget(**config.study.detectors.model_dump()))
 
 
 def run(config: ConfigView, workspace: Workspace, setup: str) -> None:

@@ -10,9 +10,9 @@ import torch
 
 from odisar.config.loader import ConfigView
 from odisar.config.study import FitConfig
+from odisar.fitting import FitBudget
 from odisar.forecasters.constant_velocity import ConstantVelocity
 from odisar.forecasters.direct_linear import DirectLinear
-from odisar.forecasters.fitting import FittingPlan
 from odisar.forecasters.gru import GruForecaster, GruSize
 from odisar.forecasters.interface import Forecaster
 from odisar.forecasters.persistence import Persistence
@@ -107,7 +107,7 @@ def simple_forecasters(
 ) -> dict[str, Callable[[], Forecaster]]:
     """Return what makes each forecaster that is no twin, by name; ``data.spec`` says the rest."""
     scaler, spec, rate_hz = data.scaler, data.spec, data.case.rate_hz
-    plan = _fitting(config, fit)
+    budget, seed = FitBudget(**fit.model_dump()), derive_seed(config.seed, "forecasters")
     mixer = MixerSize(config.twin.patch_steps, 32, 3, 0.1)
     return {
         "persistence": lambda: Persistence(scaler, spec),
@@ -115,27 +115,16 @@ def simple_forecasters(
             scaler, spec, rate_hz, _SLOPE_STEPS, _DAMPINGS
         ),
         "closed-form": lambda: DirectLinear(scaler, spec, _LAGS_STEPS, _PENALTIES),
-        "gru": lambda: GruForecaster(GruSize(64, 128), plan),
-        "patch-ts-mixer": lambda: MixerForecaster(mixer, plan),
+        "gru": lambda: GruForecaster(GruSize(64, 128), budget, seed),
+        "patch-ts-mixer": lambda: MixerForecaster(mixer, budget, seed),
     }
 
 
 def pilot_forecasters(config: ConfigView, fit: FitConfig) -> dict[str, Callable[[], Forecaster]]:
     """Return what makes each model of the paper's pilot study but the Transformer, by name."""
-    plan = _fitting(config, fit)
+    budget, seed = FitBudget(**fit.model_dump()), derive_seed(config.seed, "forecasters")
     return {
-        "rnn": lambda: RnnForecaster(RnnSize(64), plan),
-        "vae": lambda: VaeForecaster(GenerativeSize(128, 16, 0.01), plan),
-        "gan": lambda: GanForecaster(GenerativeSize(128, 16, 0.01), plan),
+        "rnn": lambda: RnnForecaster(RnnSize(64), budget, seed),
+        "vae": lambda: VaeForecaster(GenerativeSize(128, 16, 0.01), budget, seed),
+        "gan": lambda: GanForecaster(GenerativeSize(128, 16, 0.01), budget, seed),
     }
-
-
-def _fitting(config: ConfigView, fit: FitConfig) -> FittingPlan:
-    return FittingPlan(
-        steps=fit.steps,
-        batch_size=fit.batch_size,
-        learning_rate=fit.learning_rate,
-        gradient_clip=config.training.gradient_clip,
-        validations=fit.validations,
-        seed=derive_seed(config.seed, "forecasters"),
-    )

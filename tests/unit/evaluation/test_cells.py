@@ -80,3 +80,62 @@ def test_recordings_without_a_strength_have_a_cell_of_their_own():
         groups=groups,
     )
     assert by_name(disturbed_cells(rows, groups)) == {("overall", None): [0], ("overall", 1.0): [1]}
+
+
+def faulty(*rows, group_by=("disturbance", "variant"), apart=(), with_clean=()):
+    """Return cells by name of recordings given as (maneuver, variant, disturbance)."""
+    groups = Groups(
+        overall={}, group_by=list(group_by), apart=list(apart), with_clean=list(with_clean)
+    )
+    infos = [
+        RecordingInfo("case", maneuver, variant, disturbance, "all", None)
+        for maneuver, variant, disturbance in rows
+    ]
+    descriptions = [describe(info, groups) for info in infos]
+    cells = disturbed_cells(descriptions, groups), clean_cells(descriptions, groups)
+    names = [[cell.evaluated_on for cell in own] for own in cells]
+    assert all(len(set(own)) == len(own) for own in names)
+    return [{cell.evaluated_on: cell.members.tolist() for cell in own} for own in cells]
+
+
+def test_a_value_of_two_columns_over_the_same_recordings_is_one_cell():
+    disturbed, _ = faulty(("", "stuck", "stuck"), ("", "bias 1 sd", "bias"))
+    assert disturbed == {"overall": [0, 1], "bias": [1], "stuck": [0], "bias 1 sd": [1]}
+
+
+def test_a_value_of_two_columns_over_other_recordings_is_named_with_the_later_column():
+    disturbed, _ = faulty(("", "stuck", "stuck"), ("", "slow", "stuck"))
+    assert disturbed == {"overall": [0, 1], "stuck": [0, 1], "slow": [1], "stuck (variant)": [0]}
+
+
+def test_what_is_apart_is_told_from_a_group_of_the_same_name():
+    disturbed, _ = faulty(
+        ("x", "", "noise"), ("", "", "x"), group_by=["maneuver"], apart=["disturbance"]
+    )
+    assert disturbed == {"overall": [0, 1], "x": [0], "noise": [0], "x (disturbance)": [1]}
+
+
+def test_what_is_apart_and_judged_with_the_clean_is_no_group_without_them():
+    disturbed, _ = faulty(
+        ("x", "", "x"),
+        ("", "", "none"),
+        group_by=["maneuver"],
+        apart=["disturbance"],
+        with_clean=["x"],
+    )
+    assert disturbed == {"overall": [0], "x": [0], "x (disturbance)": [0, 1]}
+
+
+def test_a_value_that_is_called_overall_is_not_taken_for_all_recordings():
+    disturbed, clean = faulty(
+        ("", "overall", "noise"), ("", "", "noise"), ("", "overall", "none"), ("", "", "none")
+    )
+    assert disturbed == {"overall": [0, 1], "noise": [0, 1], "overall (variant)": [0]}
+    assert clean == {"overall": [2, 3], "overall (variant)": [2]}
+
+
+def test_clean_cells_of_two_columns_are_one_or_told_apart():
+    _, clean = faulty(
+        ("a", "a", "none"), ("b", "b", "none"), ("a", "c", "none"), group_by=["maneuver", "variant"]
+    )
+    assert clean == {"overall": [0, 1, 2], "a": [0, 2], "b": [1], "a (variant)": [0], "c": [2]}

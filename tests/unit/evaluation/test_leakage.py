@@ -8,39 +8,29 @@ from odisar.capability.scoring import CLOSED_FORM, ODISAR, RECONSTRUCTION, RMSE
 from odisar.errors import OdisarError
 from odisar.evaluation.leakage import ProbePlan, probe_leakage
 from odisar.evaluation.leakage_probes import PROBES, cut_after, score_changes
-from odisar.evaluation.leakage_report import LEAKAGE_COLUMNS, leakage_table
 from odisar.windows.coordinates import PoseChannels, features
-from odisar.windows.scaling import channel_std
 from small_innovations import small_scorer
-from small_system import make_recording
 
-STATES = (1, 2)
-RECORDINGS = [
-    make_recording("calm", 120),
-    make_recording("pushed", 150, push=0.05),
-    make_recording("third", 110),
-]
-STD = channel_std(RECORDINGS)
-EXTREME = 20.0
-
-
-def level(recording):
-    """Return a score of what is known at each sample: a mean over three samples."""
-    distance = np.abs(recording.values).sum(axis=1)
-    return np.convolve(distance, np.ones(3) / 3)[: len(distance)]
-
-
-def next_values(recording):
-    """Return the values one sample ahead; the last sample stands for its own successor."""
-    return np.vstack([recording.values[1:], recording.values[-1:]])
-
-
-def of_each(score):
-    """Return the scorer that gives every recording this score."""
-    return lambda recordings: [score(recording) for recording in recordings]
-
-
-honest = of_each(level)
+from .leaky_scores import (
+    RECORDINGS,
+    STD,
+    attends_across,
+    flinches,
+    follows_the_plan,
+    honest,
+    is_constant,
+    knows_the_length,
+    level,
+    numbers_them,
+    of_each,
+    peeks,
+    probe,
+    reads_labels,
+    reads_the_disturbance,
+    sees_commands_only,
+    standardises,
+    vanishes,
+)
 
 
 def with_gap(recording, start=60, stop=70):
@@ -51,71 +41,6 @@ def with_gap(recording, start=60, stop=70):
         time_s=recording.time_s[keep],
         values=recording.values[keep],
         segments=segments,
-    )
-
-
-def peeks(recording):
-    return level(recording) + np.abs(next_values(recording)).sum(axis=1)
-
-
-def flinches(recording):
-    """Know of the next sample only if it is extreme."""
-    return level(recording) + (np.abs(next_values(recording)).max(axis=1) > EXTREME)
-
-
-def vanishes(recording):
-    """Have no score where the next sample is extreme."""
-    extreme = np.abs(next_values(recording)).max(axis=1) > EXTREME
-    return np.where(extreme, np.nan, level(recording))
-
-
-def follows_the_plan(recording):
-    """Know of the next command, unless the states are extreme as well."""
-    command, speed, turn = np.abs(next_values(recording)).T
-    return level(recording) + (command > EXTREME) * (np.maximum(speed, turn) < EXTREME)
-
-
-def standardises(recording):
-    return level(recording) / recording.values.std()
-
-
-def knows_the_length(recording):
-    return level(recording) * (1 + 1 / len(recording.time_s))
-
-
-def reads_labels(recording):
-    return level(recording) + bool(recording.intervals)
-
-
-def reads_the_disturbance(recording):
-    return level(recording) + recording.info.is_disturbed
-
-
-def attends_across(recordings):
-    """Add what the recordings of a call have at the same sample, on average over them."""
-    common = min(len(recording.time_s) for recording in recordings)
-    mean = np.mean([level(recording)[:common] for recording in recordings], axis=0)
-    if len(recordings) == 1:
-        return honest(recordings)
-    return [level(r) + np.append(mean, np.zeros(len(r.time_s) - common)) for r in recordings]
-
-
-def numbers_them(recordings):
-    """Add how many recordings of the call came before."""
-    return [level(recording) + i for i, recording in enumerate(recordings)]
-
-
-def is_constant(recording):
-    return np.ones(len(recording.time_s))
-
-
-def sees_commands_only(recording):
-    return 1 + np.abs(recording.values[:, 0])
-
-
-def probe(score, recordings=RECORDINGS, *, seed=3, **options):
-    return probe_leakage(
-        "mine", score, recordings, std=STD, seed=seed, **{"states": STATES, **options}
     )
 
 
@@ -315,34 +240,6 @@ def test_a_twins_scores_pass_but_for_rounding(request, name, detector):
         score, [with_gap(RECORDINGS[1])], positions_per_recording=2, tolerated_share=1e-4
     )
     assert report.passed, report.sentences()
-
-
-def test_the_table_has_a_row_for_each_probe_and_counts_what_moved():
-    table = leakage_table([probe(honest), probe(of_each(peeks))])
-    assert tuple(table.columns) == LEAKAGE_COLUMNS
-    assert table["probe"].tolist() == list(PROBES) * 2
-    assert table["moved"].tolist() == [0, 0, 0, 0, 0, 9, 0, 36, 9, 0, 0, 9]
-    assert table["positions"].tolist() == [3, 36, 9, 18, 6, 9] * 2
-
-
-def test_each_finding_is_told_in_a_sentence():
-    sentences = probe(of_each(flinches), RECORDINGS[:1], positions_per_recording=1).sentences()
-    assert sentences[0] == (
-        "mine, repeat: asking again about the same recording moved a score in 0 of 1 tries."
-    )
-    assert sentences[1].startswith(
-        "mine, future: changing all samples after one moved a score up to it in 3 of 4 tries, "
-        "most at sample "
-    )
-    assert " of 'calm' (all channels pushed after " in sentences[1]
-    assert "): by 1, " in sentences[1]
-    assert sentences[-1].endswith("moved the score at that sample in 1 of 1 tries.")
-
-
-def test_a_score_that_never_moves_is_told_so():
-    sentence = probe(of_each(is_constant)).sentences()[-1]
-    assert "moved the score at that sample in 0 of 9 tries" in sentence
-    assert sentence.endswith("it never moved.")
 
 
 @pytest.mark.parametrize(

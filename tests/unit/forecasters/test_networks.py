@@ -8,9 +8,10 @@ import pytest
 import torch
 
 from odisar.errors import OdisarError
-from odisar.forecasters.fitting import FittingPlan, NetworkForecaster
+from odisar.fitting import FitBudget
 from odisar.forecasters.gru import GruForecaster, GruSize
 from odisar.forecasters.interface import WindowShape
+from odisar.forecasters.network_forecaster import NetworkForecaster
 from odisar.forecasters.persistence import Persistence
 from odisar.forecasters.pilot import (
     GanForecaster,
@@ -27,18 +28,17 @@ from odisar.windows.scaling import Scaler
 from odisar.windows.window_set import WindowSet
 from small_system import SPEC, make_recording
 
-PLAN = FittingPlan(
-    steps=200, batch_size=32, learning_rate=5e-3, gradient_clip=1.0, validations=4, seed=3
-)
+BUDGET = FitBudget(steps=200, batch_size=32, learning_rate=5e-3, gradient_clip=1.0, validations=4)
+SEED = 3
 GENERATIVE = GenerativeSize(hidden_dim=32, latent_dim=3, weight=0.1)
 MIXER = MixerSize(patch_steps=5, model_dim=8, layers=1, dropout=0.1)
 SCALER = Scaler.fit([make_recording(f"train-{i}") for i in range(6)], SPEC)
 MAKERS = {
-    "gru": lambda plan: GruForecaster(GruSize(16, 32), plan),
-    "rnn": lambda plan: RnnForecaster(RnnSize(16), plan),
-    "vae": lambda plan: VaeForecaster(GENERATIVE, plan),
-    "gan": lambda plan: GanForecaster(GENERATIVE, plan),
-    "mixer": lambda plan: MixerForecaster(MIXER, plan),
+    "gru": lambda *given: GruForecaster(GruSize(16, 32), *given),
+    "rnn": lambda *given: RnnForecaster(RnnSize(16), *given),
+    "vae": lambda *given: VaeForecaster(GENERATIVE, *given),
+    "gan": lambda *given: GanForecaster(GENERATIVE, *given),
+    "mixer": lambda *given: MixerForecaster(MIXER, *given),
 }
 # The mixer's library is in an optional group of dependencies.
 NEEDS_LIBRARY = pytest.mark.skipif(
@@ -63,7 +63,7 @@ def first_windows(windows: WindowSet, count: int = 9):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_short_fit_beats_persistence(kind, windows):
     train, validation = windows
-    forecaster: NetworkForecaster = MAKERS[kind](PLAN)
+    forecaster: NetworkForecaster = MAKERS[kind](BUDGET, SEED)
     forecaster.fit(train, validation)
     batch = validation.gather(torch.arange(len(validation)))
     forecast = forecaster.forecast(batch.context, batch.known_future)
@@ -76,12 +76,12 @@ def test_a_short_fit_beats_persistence(kind, windows):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_seed_and_windows_decide_the_forecast_and_nothing_around_it(kind, known):
-    plan = replace(PLAN, steps=12)
+    budget = replace(BUDGET, steps=12)
     batch = first_windows(known[1])
     found = []
     for noise, seed in ((0, 3), (99, 3), (0, 4)):
         torch.manual_seed(noise)
-        forecaster = MAKERS[kind](replace(plan, seed=seed))
+        forecaster = MAKERS[kind](budget, seed)
         forecaster.fit(*known)
         found.append(forecaster.forecast(batch.context, batch.known_future))
     assert torch.equal(found[0], found[1])
@@ -90,7 +90,7 @@ def test_seed_and_windows_decide_the_forecast_and_nothing_around_it(kind, known)
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_window_is_forecast_alike_alone_and_in_a_batch(kind, known):
-    forecaster = MAKERS[kind](replace(PLAN, steps=12))
+    forecaster = MAKERS[kind](replace(BUDGET, steps=12), SEED)
     forecaster.fit(*known)
     batch = first_windows(known[1])
     together = forecaster.forecast(batch.context, batch.known_future)
@@ -100,7 +100,7 @@ def test_a_window_is_forecast_alike_alone_and_in_a_batch(kind, known):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_known_commands_and_the_context_move_the_forecast(kind, known):
-    forecaster = MAKERS[kind](replace(PLAN, steps=12))
+    forecaster = MAKERS[kind](replace(BUDGET, steps=12), SEED)
     forecaster.fit(*known)
     batch = first_windows(known[1])
     forecast = forecaster.forecast(batch.context, batch.known_future)
@@ -113,7 +113,7 @@ def test_known_commands_and_the_context_move_the_forecast(kind, known):
 
 
 def test_a_step_of_the_rnn_sees_no_command_after_it(known):
-    forecaster = MAKERS["rnn"](replace(PLAN, steps=12))
+    forecaster = MAKERS["rnn"](replace(BUDGET, steps=12), SEED)
     forecaster.fit(*known)
     batch = first_windows(known[1])
     later = batch.known_future.clone()

@@ -3,10 +3,11 @@ from itertools import combinations
 import pytest
 
 from odisar.baselines.neural.registry import NOT_DEPLOYABLE as LEAKY
-from odisar.baselines.neural.registry import STUDY_BUDGET, neural_detectors
+from odisar.baselines.neural.registry import neural_detectors
 from odisar.baselines.registry import cheap_detectors, optional_detectors
 from odisar.capability.scoring import DETECTORS
 from odisar.config.loader import load_config
+from odisar.fitting import FitBudget
 from odisar.report.detectors import (
     CHEAP,
     DETECTOR_NAMES,
@@ -21,12 +22,14 @@ from odisar.report.detectors import (
 
 from .invented import ROOT
 
+BUDGET = FitBudget(**load_config(ROOT).study.detectors.model_dump())
+
 
 def test_every_detector_of_the_project_has_a_name_and_a_place():
     cases = load_config(ROOT).cases.values()
     cheap = {name for case in cases for name in cheap_detectors(case)} | set(optional_detectors())
     assert cheap == set(CHEAP)
-    assert set(neural_detectors(STUDY_BUDGET)) == set(NEURAL)
+    assert set(neural_detectors(BUDGET)) == set(NEURAL)
     assert set(DETECTORS) == set(TWIN_SCORES)
     assert {*CHEAP, *NEURAL, *TWIN_SCORES, ORACLE} == set(DETECTOR_NAMES)
     assert len(set(DETECTOR_NAMES.values())) == len(DETECTOR_NAMES)

@@ -186,3 +186,19 @@ def test_the_finest_groups_are_left_to_the_tables_and_that_is_said(results):
     assert left_out_note(results, "vessel-all") == (
         "Not drawn, but in the tables: groups by fault_on."
     )
+
+
+def test_a_scenario_that_shares_its_value_with_another_column_is_told_with_its_own(results):
+    known = results.examples.recordings
+    known["disturbance"] = known["maneuver"] = "storm"
+    table = results.quadrants
+    judged = table[table.setup == "vessel-all"]
+    results.quadrants = pd.concat(
+        [judged.assign(evaluated_on=name) for name in ("overall", "storm", "storm (maneuver)")]
+    )
+    scenarios = results.scenarios("vessel-all")
+    assert dict(zip(scenarios.evaluated_on, scenarios.group, strict=True)) == {
+        "overall": "overall",
+        "storm": "disturbance",
+        "storm (maneuver)": "maneuver",
+    }

@@ -28,7 +28,13 @@ DATA = SimpleNamespace(scaler=SCALER, spec=SPEC, case=SimpleNamespace(rate_hz=1.
 
 def fit(steps, batch_size=32):
     """Return how long forecasters are fitted."""
-    return FitConfig(steps=steps, batch_size=batch_size, learning_rate=2.0e-3, validations=5)
+    return FitConfig(
+        steps=steps,
+        batch_size=batch_size,
+        learning_rate=2.0e-3,
+        gradient_clip=1.0,
+        validations=5,
+    )
 
 
 @pytest.fixture

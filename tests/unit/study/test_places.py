@@ -61,6 +61,13 @@ def test_code_that_decides_what_is_scored_changes_it_and_no_other(workspace, sou
     assert study_folder(workspace) != before
 
 
-def test_the_packages_that_decide_are_packages(request):
+def test_a_module_that_decides_changes_it_too(workspace, source):
+    before = study_folder(workspace)
+    (source / "fitting.py").write_text("A = 2\n")
+    assert study_folder(workspace) != before
+
+
+def test_what_decides_is_a_package_or_a_module(request):
     root = Path(request.config.rootpath) / "src/odisar"
-    assert [name for name in places._DECISIVE if not (root / name / "__init__.py").exists()] == []
+    ends = [name if name.endswith(".py") else f"{name}/__init__.py" for name in places._DECISIVE]
+    assert [end for end in ends if not (root / end).is_file()] == []

@@ -12,17 +12,11 @@ import torch.nn.functional as F
 from torch import nn
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import (
-    FitBudget,
-    Lesson,
-    build_network,
-    fit_network,
-    reference_windows,
-)
+from odisar.baselines.neural.learning import fitted_network, reference_windows
 from odisar.baselines.neural.scoring import ContextWindows, FloatArray, WindowDetector
 from odisar.baselines.neural.transformations import TRANSFORMATIONS, transformed
+from odisar.fitting import FitBudget
 from odisar.seeding import derive_seed
-from odisar.windows.windowing import Batch
 
 _CHANNELS = 32
 # Places along the window at which the classifier keeps what it found.
@@ -75,22 +69,20 @@ class ConformalTransformations(WindowDetector):
 
     def _learn(self, reference: Reference, _windows: ContextWindows) -> None:
         """Fit the classifier on training windows; held-out ones, end to end, are the measure."""
-        train, held_out = reference_windows(reference)
-        seed = derive_seed(reference.seed, "codit")
-        network = build_network(lambda: TransformationClassifier(train.samples.shape[1]), seed)
-
-        def loss(batch: Batch) -> torch.Tensor:
-            return network.losses(batch.context).mean()
-
-        fit_network(
-            network, Lesson("transformation classifier", loss, train, held_out), self._budget, seed
+        windows = reference_windows(reference)
+        self._network = fitted_network(
+            "transformation classifier",
+            lambda: TransformationClassifier(windows[0].samples.shape[1]),
+            lambda network, batch: network.losses(batch.context).mean(),
+            windows,
+            self._budget,
+            derive_seed(reference.seed, "codit"),
         )
-        self._network = network
         end_to_end = ContextWindows.of(reference, reference.spec.context_steps)
         known = [
             losses
             for recording in reference.held_out
-            for losses in end_to_end.values(recording, network.losses)
+            for losses in end_to_end.values(recording, self._network.losses)
         ]
         self._known_losses = np.sort(np.concatenate(known), axis=0)
 

@@ -7,8 +7,8 @@ import torch
 from torch import nn
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import SharedFit
 from odisar.baselines.neural.layers import HorizonOutput
+from odisar.baselines.neural.learning import SharedFit
 from odisar.baselines.neural.scoring import ContextWindows, WindowDetector, root_mean_square
 from odisar.seeding import derive_seed
 

@@ -5,15 +5,10 @@ import torch.nn.functional as F
 from torch import nn
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import (
-    FitBudget,
-    Lesson,
-    build_network,
-    fit_network,
-    reference_windows,
-)
 from odisar.baselines.neural.layers import ContextReader, HorizonHead, HorizonOutput
+from odisar.baselines.neural.learning import fitted_network, reference_windows
 from odisar.baselines.neural.scoring import ContextWindows, WindowDetector, root_mean_square
+from odisar.fitting import FitBudget
 from odisar.seeding import derive_seed
 from odisar.windows.windowing import Batch, WindowSpec
 
@@ -60,8 +55,12 @@ class GruReconstruction(WindowDetector):
 
 def fit_gru_twin(reference: Reference, budget: FitBudget) -> GruTwin:
     """Return a twin whose weights follow from the reference and its seed."""
-    train, held_out = reference_windows(reference)
-    seed = derive_seed(reference.seed, "gru-twin")
-    network = build_network(lambda: GruTwin(reference.spec, train.samples.shape[1]), seed)
-    fit_network(network, Lesson("GRU twin", network.loss, train, held_out), budget, seed)
-    return network
+    windows = reference_windows(reference)
+    return fitted_network(
+        "GRU twin",
+        lambda: GruTwin(reference.spec, windows[0].samples.shape[1]),
+        GruTwin.loss,
+        windows,
+        budget,
+        derive_seed(reference.seed, "gru-twin"),
+    )

@@ -19,19 +19,12 @@ import torch
 from numpy.typing import NDArray
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import (
-    FitBudget,
-    Lesson,
-    SharedFit,
-    build_network,
-    fit_network,
-    one_thread,
-    reference_windows,
-)
 from odisar.baselines.neural.layers import HorizonOutput
+from odisar.baselines.neural.learning import SharedFit, build_network, reference_windows
 from odisar.baselines.neural.published_network import PublishedNetwork
 from odisar.baselines.neural.scoring import NotFittedError, root_mean_square
 from odisar.errors import OdisarError
+from odisar.fitting import FitBudget, Lesson, fit_network, one_thread
 from odisar.recordings.schema import Recording
 from odisar.seeding import derive_seed
 from odisar.windows.targets import horizon_targets
@@ -45,13 +38,13 @@ _JOINT_SHARE = 120 / 220
 
 
 def fit_published_network(reference: Reference, budget: FitBudget) -> PublishedNetwork:
-    """Return the network after both phases; ``budget.batch`` gives way to the published one."""
+    """Return the network after both phases; the budget's batch gives way to the published one."""
     train, held_out = reference_windows(reference)
     seed = derive_seed(reference.seed, "published-recipe")
     features = train.samples.shape[1]
     network = build_network(lambda: PublishedNetwork(reference.spec, features), seed)
-    budget = replace(budget, batch=PUBLISHED_BATCH)
-    lesson = Lesson("published recipe", network.joint_loss, train, held_out)
+    budget = replace(budget, batch_size=PUBLISHED_BATCH)
+    lesson = Lesson("published recipe", network.joint_loss, train, held_out, noise="dropout")
     fit_network(network, lesson, budget.part(_JOINT_SHARE), derive_seed(seed, "joint"))
     network.keep_only_reconstruction_trainable()
     lesson = replace(lesson, loss=network.reconstruction_loss)

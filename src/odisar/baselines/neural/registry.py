@@ -7,8 +7,8 @@ from torch import nn
 from odisar.baselines.interface import Detector, Reference
 from odisar.baselines.neural.conformal_cps import ConformalTransformations
 from odisar.baselines.neural.ensemble import EnsembleReconstruction, EnsembleVariance, fit_members
-from odisar.baselines.neural.fitting import FitBudget, SharedFit
 from odisar.baselines.neural.gru_twin import GruReconstruction, fit_gru_twin
+from odisar.baselines.neural.learning import SharedFit
 from odisar.baselines.neural.published_network import PublishedNetwork
 from odisar.baselines.neural.published_recipe import (
     PublishedRecipe,
@@ -17,15 +17,13 @@ from odisar.baselines.neural.published_recipe import (
 )
 from odisar.baselines.neural.two_models import RnnThenAutoencoder
 from odisar.baselines.neural.window_autoencoder import InputReconstruction
+from odisar.fitting import FitBudget
 
 PUBLISHED_RECIPE = "published-recipe"
 PUBLISHED_RECIPE_LAST_STATE = "published-recipe-last-state"
 
 #: Detectors whose score at t depends on what comes after t, or on other recordings.
 NOT_DEPLOYABLE = (PUBLISHED_RECIPE, PUBLISHED_RECIPE_LAST_STATE)
-
-#: Keeps every fit below about 90 CPU-s on the vessel's 44 training recordings.
-STUDY_BUDGET = FitBudget(steps=2000, batch=64, learning_rate=2.0e-3, validations=10)
 
 _MEMBERS = 4
 # Four members in twice the time of one twin; their validation loss has settled by then.

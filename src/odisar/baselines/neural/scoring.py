@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import one_thread
 from odisar.errors import OdisarError
+from odisar.fitting import one_thread
 from odisar.recordings.schema import Recording
 from odisar.windows.scaling import Scaler
 from odisar.windows.window_set import scaled_features

@@ -5,15 +5,10 @@ import torch.nn.functional as F
 from torch import nn
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import (
-    FitBudget,
-    Lesson,
-    build_network,
-    fit_network,
-    reference_windows,
-)
 from odisar.baselines.neural.layers import Autoencoder, ContextReader, HorizonHead
+from odisar.baselines.neural.learning import fitted_network, reference_windows
 from odisar.baselines.neural.scoring import ContextWindows, WindowDetector, root_mean_square
+from odisar.fitting import FitBudget
 from odisar.seeding import derive_seed
 from odisar.windows.windowing import Batch
 
@@ -36,42 +31,38 @@ class RnnThenAutoencoder(WindowDetector):
 
     def _learn(self, reference: Reference, _windows: ContextWindows) -> None:
         """Fit the forecaster to the truth, then the autoencoder to the forecasts."""
-        train, held_out = reference_windows(reference)
+        windows = reference_windows(reference)
         seed = derive_seed(reference.seed, "rnn-then-autoencoder")
-        spec, features = reference.spec, train.samples.shape[1]
-        forecaster = build_network(
+        spec, features = reference.spec, windows[0].samples.shape[1]
+        self._forecaster = fitted_network(
+            "LSTM forecaster",
             lambda: nn.Sequential(
                 ContextReader("lstm", features, _WIDTH), HorizonHead(_WIDTH, spec)
             ),
+            _forecast_loss,
+            windows,
+            self._budget,
             derive_seed(seed, "forecaster"),
         )
         shape = (spec.horizon_steps, len(spec.outputs))
-        autoencoder = build_network(
-            lambda: Autoencoder(shape, _HIDDEN, _BOTTLENECK), derive_seed(seed, "autoencoder")
-        )
-
-        def forecast_loss(batch: Batch) -> torch.Tensor:
-            return F.mse_loss(forecaster(batch.context), batch.truth)
-
-        def reconstruction_loss(batch: Batch) -> torch.Tensor:
-            with torch.no_grad():
-                forecast = forecaster(batch.context)
-            return F.mse_loss(autoencoder(forecast), forecast)
-
-        fit_network(
-            forecaster,
-            Lesson("LSTM forecaster", forecast_loss, train, held_out),
-            self._budget,
-            derive_seed(seed, "forecaster"),
-        )
-        fit_network(
-            autoencoder,
-            Lesson("autoencoder of forecasts", reconstruction_loss, train, held_out),
+        self._autoencoder = fitted_network(
+            "autoencoder of forecasts",
+            lambda: Autoencoder(shape, _HIDDEN, _BOTTLENECK),
+            self._reconstruction_loss,
+            windows,
             self._budget,
             derive_seed(seed, "autoencoder"),
         )
-        self._forecaster, self._autoencoder = forecaster, autoencoder
+
+    def _reconstruction_loss(self, autoencoder: nn.Module, batch: Batch) -> torch.Tensor:
+        with torch.no_grad():
+            forecast = self._forecaster(batch.context)
+        return F.mse_loss(autoencoder(forecast), forecast)
 
     def _of_contexts(self, contexts: torch.Tensor) -> torch.Tensor:
         forecast = self._forecaster(contexts)
         return root_mean_square(self._autoencoder(forecast) - forecast)
+
+
+def _forecast_loss(forecaster: nn.Module, batch: Batch) -> torch.Tensor:
+    return F.mse_loss(forecaster(batch.context), batch.truth)

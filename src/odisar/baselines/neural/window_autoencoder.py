@@ -5,17 +5,11 @@ import torch
 import torch.nn.functional as F
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import (
-    FitBudget,
-    Lesson,
-    build_network,
-    fit_network,
-    reference_windows,
-)
 from odisar.baselines.neural.layers import Autoencoder
+from odisar.baselines.neural.learning import fitted_network, reference_windows
 from odisar.baselines.neural.scoring import ContextWindows, FloatArray, WindowDetector
+from odisar.fitting import FitBudget
 from odisar.seeding import derive_seed
-from odisar.windows.windowing import Batch
 
 _HIDDEN = 128
 _BOTTLENECK = 16
@@ -40,18 +34,16 @@ class InputReconstruction(WindowDetector):
 
     def _learn(self, reference: Reference, windows: ContextWindows) -> None:
         """Fit the autoencoder on training contexts, the spread on held-out ones."""
-        train, held_out = reference_windows(reference)
-        seed = derive_seed(reference.seed, "input-reconstruction")
-        shape = (reference.spec.context_steps, train.samples.shape[1])
-        network = build_network(lambda: Autoencoder(shape, _HIDDEN, _BOTTLENECK), seed)
-
-        def loss(batch: Batch) -> torch.Tensor:
-            return F.mse_loss(network(batch.context), batch.context)
-
-        fit_network(
-            network, Lesson("autoencoder of contexts", loss, train, held_out), self._budget, seed
+        fitted_on = reference_windows(reference)
+        shape = (reference.spec.context_steps, fitted_on[0].samples.shape[1])
+        self._network = fitted_network(
+            "autoencoder of contexts",
+            lambda: Autoencoder(shape, _HIDDEN, _BOTTLENECK),
+            lambda network, batch: F.mse_loss(network(batch.context), batch.context),
+            fitted_on,
+            self._budget,
+            derive_seed(reference.seed, "input-reconstruction"),
         )
-        self._network = network
         residuals = np.concatenate(
             [
                 values

@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 from odisar.baselines.interface import Reference
-from odisar.baselines.neural.fitting import FitBudget
 from odisar.baselines.neural.registry import NOT_DEPLOYABLE, neural_detectors
+from odisar.fitting import FitBudget
 from odisar.recordings.schema import Recording
 from odisar.windows.scaling import Scaler
 from small_reference import drive_reference, system_reference
 
-BUDGET = FitBudget(steps=40, batch=32, learning_rate=3.0e-3, validations=4)
+BUDGET = FitBudget(steps=40, batch_size=32, learning_rate=3.0e-3, gradient_clip=1.0, validations=4)
 REFERENCES = {"system": system_reference, "drive": drive_reference}
 DEPLOYABLE = tuple(name for name in neural_detectors(BUDGET) if name not in NOT_DEPLOYABLE)
 

@@ -4,8 +4,8 @@ from torch import nn
 
 from odisar.baselines.interface import context_positions
 from odisar.baselines.neural.ensemble import EnsembleReconstruction, EnsembleVariance, fit_members
-from odisar.baselines.neural.fitting import SharedFit
 from odisar.baselines.neural.layers import HorizonOutput
+from odisar.baselines.neural.learning import SharedFit
 from small_reference import system_reference
 
 REFERENCE = system_reference()

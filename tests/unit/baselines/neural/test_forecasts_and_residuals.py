@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from odisar.baselines.interface import context_positions
-from odisar.baselines.neural.fitting import reference_windows
 from odisar.baselines.neural.gru_twin import GruTwin, fit_gru_twin
+from odisar.baselines.neural.learning import reference_windows
 from odisar.windows.windowing import Batch
 
 from .neural_cases import BUDGET

@@ -1,4 +1,4 @@
-from odisar.baselines.neural.registry import NOT_DEPLOYABLE, STUDY_BUDGET, neural_detectors
+from odisar.baselines.neural.registry import NOT_DEPLOYABLE, neural_detectors
 
 from .neural_cases import BUDGET
 
@@ -21,5 +21,5 @@ def test_the_published_recipes_are_not_deployable():
 
 
 def test_every_call_makes_a_detector_of_its_own():
-    for make in neural_detectors(STUDY_BUDGET).values():
+    for make in neural_detectors(BUDGET).values():
         assert make() is not make()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from odisar.baselines.neural.fitting import FitBudget, SharedFit
+from odisar.baselines.neural.learning import SharedFit
 from odisar.baselines.neural.published_recipe import (
     PUBLISHED_BATCH,
     PublishedRecipe,
@@ -13,12 +13,13 @@ from odisar.baselines.neural.published_recipe import (
     fit_published_network,
 )
 from odisar.errors import OdisarError
+from odisar.fitting import FitBudget
 from small_reference import changed
 
 from .neural_cases import REFERENCES, cut, with_equal_lengths
 
 STRIDE = 10
-BUDGET = FitBudget(steps=6, batch=8, learning_rate=3.0e-3, validations=2)
+BUDGET = FitBudget(steps=6, batch_size=8, learning_rate=3.0e-3, gradient_clip=1.0, validations=2)
 KINDS = (PublishedRecipe, PublishedRecipeLastState)
 
 
