@@ -35,8 +35,8 @@ class Assessment:
 
     Steps count samples of the recording from 0, times are its own seconds; both name the forecast
     horizon, which begins one step after the assessment was made (``issued_s``). ``is_OOD`` is what
-    ``score`` says, that of the innovations up to then; the paper's own score, flag and attribution
-    stand beside it. Attributions are empty unless their score is above its threshold.
+    ``score`` says, known when it was issued; the paper's own score, flag and attribution stand
+    beside it. Attributions are empty unless their score is above its threshold.
     """
 
     recording: str
@@ -152,7 +152,7 @@ def reported_windows(scores: RecordingScores, stride_steps: int) -> NDArray[np.i
 def blame_windows(
     scorer: Scorer, recording: Recording, scores: RecordingScores, windows: NDArray[np.int64]
 ) -> FloatArray:
-    """Return (window, state) how much each state explains of the score of these windows.
+    """Return (window, state) how much each state explains of what is seen at these windows.
 
     States are those of ``blamed_names``; see ``Signatures.blame``.
     """

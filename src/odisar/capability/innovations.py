@@ -158,11 +158,11 @@ class InnovationSteps:
 class InnovationScore:
     """The monitor's score, as exp of a weighted sum of statistics on their common log scale.
 
-    The largest of T2 of the mean innovation, the size of the innovations and, where there is one,
-    the reconstruction error of the forecast (``reconstruction`` is its scale), which notices what
-    any of them does; and, with weight ``recent_share``, T2 of the mean of very few innovations,
-    which lets go as soon as a disturbance has ended. 1 is what is usual on held-out recordings,
-    e = 2.7 what is rare.
+    The largest of T2 of the mean innovation, the size of the innovations of the state that scatters
+    most and, where there is one, the reconstruction error of the forecast (``reconstruction`` is
+    its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
+    mean of very few innovations, which lets go as soon as a disturbance has ended. 1 is what is
+    usual on held-out recordings, e = 2.7 what is rare.
     """
 
     mean: MeanInnovation

@@ -112,8 +112,10 @@ class Signatures:
     ) -> FloatArray:
         """Return (window, state) the most that a step explains which set in during the alarm."""
         jumps = self._jumps(np.nan_to_num(innovations), directions)
-        lead_in = self.score.mean.steps + len(jumps) - 1
-        starts = alarm_starts(self.score.parts(innovations).max(axis=0) >= 1, self.score.mean.steps)
+        # What is rare now may have set in when the oldest sample that is looked at came.
+        memory = max(self.score.mean.steps, self.score.size.steps)
+        lead_in = memory + len(jumps) - 1
+        starts = alarm_starts(self.score.parts(innovations).max(axis=0) >= 1, memory)
         found = np.zeros((len(windows), directions.shape[1]))
         for row, window in enumerate(windows):
             first = max(0, int(starts[window]) - lead_in)

@@ -10,7 +10,7 @@ from odisar.config.judging import Judging
 from odisar.evaluation.intervals import Resampler
 from odisar.seeding import generator
 
-#: How the states of a window were ranked: by what explains the score, and as the paper does.
+#: How the states of a window were ranked: by what explains the innovations, and as the paper does.
 ATTRIBUTIONS = {"odisar": "state", "reconstruction": "rebuilt_state"}
 
 BLAME_COLUMNS = (

@@ -59,13 +59,15 @@ def disturbed_cells(descriptions: Sequence[Description], groups: Groups) -> list
     A group is named by its value. Where two columns share a value over the same recordings they
     are one group; over others the later group is named "value (column)" (see ``cell_name``).
     """
+    names = _group_names(descriptions, groups)
     disturbed = [i for i, d in enumerate(descriptions) if is_disturbed(d)]
     clean = [i for i, d in enumerate(descriptions) if not is_disturbed(d)]
     overall = [i for i in disturbed if _is_overall(descriptions[i], groups)]
     pools = {OVERALL: overall}
     for column in groups.group_by:
         for value in _values(descriptions, column):
-            _pool(pools, column, value, [i for i in overall if descriptions[i][column] == value])
+            chosen = [i for i in overall if descriptions[i][column] == value]
+            _pool(pools, (names[column, value], cell_name(column, value)), chosen)
     for column in groups.apart:
         alike = [
             i for i in disturbed if _is_overall(descriptions[i], groups, but=column, passing=("",))
@@ -74,7 +76,7 @@ def disturbed_cells(descriptions: Sequence[Description], groups: Groups) -> list
             if value not in groups.overall.get(column, []):
                 chosen = [i for i in alike if descriptions[i][column] == value]
                 chosen += clean if value in groups.with_clean else []
-                _pool(pools, column, value, chosen)
+                _pool(pools, (names[column, value], cell_name(column, value)), chosen)
     return [cell for name, chosen in pools.items() for cell in _split(descriptions, name, chosen)]
 
 
@@ -84,6 +86,7 @@ def clean_cells(descriptions: Sequence[Description], groups: Groups) -> list[Cel
     ``overall`` narrows them too, but not by columns that say what disturbs (which is nothing).
     Groups are named as in ``disturbed_cells``.
     """
+    names = _group_names(descriptions, groups)
     clean = [
         i
         for i, d in enumerate(descriptions)
@@ -92,7 +95,8 @@ def clean_cells(descriptions: Sequence[Description], groups: Groups) -> list[Cel
     pools = {OVERALL: clean}
     for column in groups.group_by:
         for value in _values(descriptions, column):
-            _pool(pools, column, value, [i for i in clean if descriptions[i][column] == value])
+            chosen = [i for i in clean if descriptions[i][column] == value]
+            _pool(pools, (names[column, value], cell_name(column, value)), chosen)
     return [Cell(name, None, np.array(members)) for name, members in pools.items() if members]
 
 
@@ -101,11 +105,29 @@ def cell_name(column: str, value: str) -> str:
     return f"{value} ({column})"
 
 
-def _pool(pools: dict[str, list[int]], column: str, value: str, chosen: list[int]) -> None:
-    """Add a group, if it has recordings, under a name that no other recordings have."""
+def _group_names(descriptions: Sequence[Description], groups: Groups) -> dict[tuple[str, str], str]:
+    """Return the name of each group by column and value.
+
+    It follows from all recordings, disturbed or not: a group has one name in every table.
+    """
+    names: dict[tuple[str, str], str] = {}
+    named: dict[str, list[int]] = {OVERALL: []}
+    for column in dict.fromkeys([*groups.group_by, *groups.apart]):
+        for value in _values(descriptions, column):
+            members = [i for i, d in enumerate(descriptions) if d[column] == value]
+            is_free = named.setdefault(value, members) == members
+            names[column, value] = value if is_free else cell_name(column, value)
+    return names
+
+
+def _pool(pools: dict[str, list[int]], names: tuple[str, str], chosen: list[int]) -> None:
+    """Add a group, if it has recordings, under the first name that no other recordings have.
+
+    One name can still stand for two pools where one of them is judged with the clean recordings.
+    """
     if chosen:
-        name = value if pools.get(value, chosen) == chosen else cell_name(column, value)
-        pools[name] = chosen
+        first, second = names
+        pools[first if pools.get(first, chosen) == chosen else second] = chosen
 
 
 def _is_overall(

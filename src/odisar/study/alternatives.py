@@ -31,13 +31,17 @@ class _Job:
     names: tuple[str, ...]
 
 
-def all_alternatives(config: ConfigView) -> dict[str, Callable[[], Detector]]:
-    """Return what makes each alternative of the study, by name."""
+def all_alternatives(config: ConfigView, share: float = 1.0) -> dict[str, Callable[[], Detector]]:
+    """Return what makes each alternative of the study, by name.
+
+    Networks are trained for a ``share`` of their steps.
+    """
     optional: dict[str, Callable[[], Detector]] = {
         name: lambda name=name: optional_detectors()[name]  # type: ignore[misc]
         for name in optional_detectors()
     }
-    return optional | neural_detectors(FitBudget(**config.study.detectors.model_dump()))
+    budget = FitBudget(**config.study.detectors.model_dump())
+    return optional | neural_detectors(budget.part(share))
 
 
 def run(config: ConfigView, workspace: Workspace, setup: str) -> None:

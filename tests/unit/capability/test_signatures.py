@@ -257,6 +257,18 @@ def test_blame_knows_nothing_of_what_comes_later():
     np.testing.assert_allclose(cut, whole)
 
 
+def test_the_onset_is_sought_as_far_back_as_either_statistic_looks():
+    runs = [generator(4, "long").normal(size=(900, 2))]
+    score = InnovationScore.fit(runs, None, InnovationSteps(2, 20, 2, 0.0))
+    innovations = generator(4, "calm").normal(size=(60, 2)) * 0.1
+    innovations[30] += [0.0, 8.0]
+    signatures = Signatures(score, np.array([np.eye(2)] * 3))
+    directions = np.broadcast_to(np.eye(2), (60, 2, 2))
+    found = signatures.blame(innovations, np.array([49, 59]), directions)
+    assert found[0, 1] > 4
+    assert found[1].max() < 1
+
+
 def test_an_alarm_goes_on_over_a_short_gap():
     rare = np.zeros(16, dtype=bool)
     rare[[3, 5, 6, 12]] = True

@@ -139,3 +139,16 @@ def test_clean_cells_of_two_columns_are_one_or_told_apart():
         ("a", "a", "none"), ("b", "b", "none"), ("a", "c", "none"), group_by=["maneuver", "variant"]
     )
     assert clean == {"overall": [0, 1, 2], "a": [0, 2], "b": [1], "a (variant)": [0], "c": [2]}
+
+
+def test_a_group_has_one_name_among_the_disturbed_and_the_clean():
+    disturbed, clean = faulty(
+        ("a", "b", "noise"),
+        ("b", "c", "noise"),
+        ("c", "b", "none"),
+        group_by=["maneuver", "variant"],
+    )
+    assert disturbed["b"] == [1]
+    assert disturbed["b (variant)"] == [0]
+    assert clean["b (variant)"] == [2]
+    assert "b" not in clean
