@@ -123,6 +123,11 @@ class Scorer:
         """Return (window,) Monte Carlo variance of the forecasts issued at ``positions``."""
         return predictive_variance(self.draws(recording, positions))
 
+    def forecast_windows(self, context: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+        """Return (window, step, state) forecasts of scaled windows (see ``model_inputs``)."""
+        output = self._forecast(context.to(self._device), known.to(self._device))
+        return output.forecast
+
     def forecast(self, recording: Recording, positions: NDArray[np.int64]) -> TwinOutput:
         """Return forecasts and reconstructions (window, step, state), scaled, on the CPU."""
         samples = self._samples(recording)

@@ -6,7 +6,6 @@ these sums (see ``evaluation.intervals``).
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -42,16 +41,8 @@ FORECAST_COLUMNS = (
     "recordings",
     "windows",
 )
-FORECAST_PAIR_COLUMNS = (
-    "setup",
-    "commands",
-    "forecaster",
-    "against",
-    "mse_ratio",
-    "ci_low",
-    "ci_high",
-)
-
+#: Windows that are judged start every quarter of a horizon; a table has so many of its steps.
+_STARTS_PER_HORIZON, _STEPS_SHOWN = 4, 12
 #: Windows forecast at a time; a matter of memory, not of results.
 _BATCH = 256
 
@@ -72,7 +63,7 @@ class ForecastErrors:
     clusters
         (recording,) recordings that vary together share one.
     target_std
-        (state,) what one scaled unit is in physical ones.
+        (recording, state) what one scaled unit is in physical ones: folds have scales of their own.
     commands
         ``known-ahead`` where the commands of the horizon were given, else ``unknown``.
     """
@@ -83,15 +74,28 @@ class ForecastErrors:
     target_std: FloatArray
     commands: str
 
+    @classmethod
+    def joined(cls, parts: Sequence["ForecastErrors"]) -> "ForecastErrors":
+        """Return the errors of the same forecasters on all recordings of some folds."""
+        return cls(
+            squares={
+                name: np.concatenate([part.squares[name] for part in parts])
+                for name in parts[0].squares
+            },
+            windows=np.concatenate([part.windows for part in parts]),
+            clusters=tuple(cluster for part in parts for cluster in part.clusters),
+            target_std=np.concatenate([part.target_std for part in parts]),
+            commands=parts[0].commands,
+        )
+
 
 def forecast_errors(
     recordings: Sequence[Recording],
     scaler: Scaler,
     spec: WindowSpec,
     forecasters: Mapping[str, Forecast],
-    stride_steps: int,
 ) -> ForecastErrors:
-    """Forecast every ``stride_steps``-th window of undisturbed recordings and sum the errors.
+    """Forecast windows of undisturbed recordings, a quarter of a horizon apart; sum the errors.
 
     Raises OdisarError where a recording is disturbed (no forecaster was promised to know that),
     where none holds a window, or where a forecaster answers with an array of another shape.
@@ -103,6 +107,7 @@ def forecast_errors(
                 "forecast accuracy is that of undisturbed recordings: leave it out"
             )
     ordered = sorted(recordings, key=lambda item: item.name)
+    stride_steps = max(1, spec.horizon_steps // _STARTS_PER_HORIZON)
     windows = [WindowSet([item], scaler, spec, stride_steps=stride_steps) for item in ordered]
     used = [i for i, item in enumerate(windows) if len(item)]
     if not used:
@@ -115,7 +120,7 @@ def forecast_errors(
         squares={name: np.stack([item[name] for item in sums]) for name in forecasters},
         windows=np.array([len(windows[i]) for i in used], dtype=np.float64),
         clusters=tuple(ordered[i].info.base_seed or ordered[i].name for i in used),
-        target_std=scaler.target_std,
+        target_std=np.tile(scaler.target_std, (len(used), 1)),
         commands="known-ahead" if spec.known_ahead else "unknown",
     )
 
@@ -124,12 +129,12 @@ def forecast_table(
     setup: str,
     errors: ForecastErrors,
     states: Sequence[str],
-    steps: Sequence[int],
     cfg: EvaluationConfig,
     base_seed: int,
 ) -> pd.DataFrame:
     """Return the tidy table of accuracy, ``FORECAST_COLUMNS``, by forecaster, state and step.
 
+    Steps are the first, the last and some between, evenly spaced.
     ``rmse`` and its interval are scaled, ``rmse_physical`` in the state's unit. State ``all``
     pools the scaled states (it has no unit), step 0 all steps. ``skill`` is 1 - MSE / MSE of
     persistence; empty where persistence isn't among the forecasters.
@@ -138,9 +143,9 @@ def forecast_table(
     reference = errors.squares.get(PERSISTENCE)
     rows: list[Row] = []
     for name, squares in errors.squares.items():
-        for cell in _cells(states, steps, squares.shape):
+        for cell in _cells(states, squares.shape):
             pooled = cell.pooled(squares)
-            mse = pooled.sum() / errors.windows.sum()
+            windows = errors.windows.sum()
             drawn = resampler.totals(pooled) / _drawn_windows(resampler, errors)
             low, high = resampler.interval(np.sqrt(drawn))
             held = np.nan if reference is None else cell.pooled(reference).sum()
@@ -151,44 +156,16 @@ def forecast_table(
                     "commands": errors.commands,
                     "state": cell.state,
                     "step": cell.step,
-                    "rmse": np.sqrt(mse),
+                    "rmse": np.sqrt(pooled.sum() / windows),
                     "ci_low": low,
                     "ci_high": high,
-                    "rmse_physical": np.sqrt(mse) * cell.unit(errors.target_std),
+                    "rmse_physical": np.sqrt(cell.physical(squares, errors.target_std) / windows),
                     "skill": 1.0 - pooled.sum() / held if held > 0 else np.nan,
                     "recordings": len(errors.windows),
-                    "windows": int(errors.windows.sum()),
+                    "windows": int(windows),
                 }
             )
     return pd.DataFrame(rows, columns=list(FORECAST_COLUMNS))
-
-
-def forecast_pairs(
-    setup: str, errors: ForecastErrors, cfg: EvaluationConfig, base_seed: int
-) -> pd.DataFrame:
-    """Return ``FORECAST_PAIR_COLUMNS``: the ratio of mean squared errors of every two forecasters.
-
-    Over all states and steps. Both meet the same recordings in every draw, so the interval is that
-    of their difference: it may leave 1 out where those of the two alone overlap.
-    """
-    resampler = _resampler(setup, errors, cfg, base_seed)
-    totals = {name: squares.mean(axis=(1, 2)) for name, squares in errors.squares.items()}
-    rows: list[Row] = []
-    for name, against in combinations(totals, 2):
-        drawn = resampler.totals(totals[name]) / resampler.totals(totals[against])
-        low, high = resampler.interval(drawn)
-        rows.append(
-            {
-                "setup": setup,
-                "commands": errors.commands,
-                "forecaster": name,
-                "against": against,
-                "mse_ratio": totals[name].sum() / totals[against].sum(),
-                "ci_low": low,
-                "ci_high": high,
-            }
-        )
-    return pd.DataFrame(rows, columns=list(FORECAST_PAIR_COLUMNS))
 
 
 @dataclass(frozen=True)
@@ -204,19 +181,18 @@ class _Cell:
         """Return (recording,) sums over windows of the mean over the cell's steps and states."""
         return np.asarray(squares[:, self.steps, self.states].mean(axis=(1, 2)))
 
-    def unit(self, target_std: FloatArray) -> float:
-        """Return what one scaled unit is in the state's own; NaN where states are pooled."""
-        return float("nan") if self.state == ALL_STATES else float(target_std[self.states][0])
+    def physical(self, squares: FloatArray, target_std: FloatArray) -> float:
+        """Return the sum over windows in the state's unit; NaN where states are pooled."""
+        if self.state == ALL_STATES:
+            return float("nan")
+        return float(self.pooled(squares * target_std[:, None] ** 2).sum())
 
 
-def _cells(states: Sequence[str], steps: Sequence[int], shape: tuple[int, ...]) -> list[_Cell]:
+def _cells(states: Sequence[str], shape: tuple[int, ...]) -> list[_Cell]:
     _, horizon_steps, count = shape
-    wrong = [step for step in steps if not 1 <= step <= horizon_steps]
-    if wrong or len(states) != count:
-        raise OdisarError(
-            f"forecasts have {count} states and steps 1 to {horizon_steps}; asked for were the "
-            f"states {list(states)} and the steps {list(steps)}"
-        )
+    if len(states) != count:
+        raise OdisarError(f"forecasts have {count} states; asked for were {list(states)}")
+    steps = sorted({1, *np.linspace(1, horizon_steps, _STEPS_SHOWN).round().astype(int).tolist()})
     chosen_states = [(ALL_STATES, slice(None))]
     chosen_states += [(name, slice(i, i + 1)) for i, name in enumerate(states)]
     chosen_steps = [(ALL_STEPS, slice(None)), *((step, slice(step - 1, step)) for step in steps)]

@@ -13,6 +13,7 @@ from odisar.report.detectors import (
     RECONSTRUCTION,
     detector_name,
 )
+from odisar.report.figures.forecasting import ALL_STEPS, forecaster_name
 from odisar.report.figures.leakage import probed
 from odisar.report.figures.pairs import pairs_of
 from odisar.report.figures.reliability import ALL_STATES, DISTRIBUTION_NAMES
@@ -119,6 +120,30 @@ def _rule_table(title: str, rows: pd.DataFrame, note: str = "", *, folded: bool 
         "delay p50 [s]",
     ]
     return Table(title, heads, lines, note, folded)
+
+
+def forecasts(results: Results, setup: str) -> Table:
+    """Return the errors of the twin's forecasts and of simpler ones, over all steps."""
+    table = results.forecast
+    table = table[(table.setup == setup) & (table.step == ALL_STEPS)]
+    lines = [
+        [
+            forecaster_name(row.forecaster),
+            "known" if row.commands == "known-ahead" else "unknown",
+            "all (scaled)" if row.state == ALL_STATES else row.state,
+            f"{number(row.rmse)} [{number(row.ci_low)}, {number(row.ci_high)}]",
+            number(row.rmse_physical),
+            number(row.skill),
+        ]
+        for row in rows_of(table.sort_values("state", key=lambda s: s != ALL_STATES, kind="stable"))
+    ]
+    heads = ["forecaster", "commands of the horizon", "state", "RMSE, scaled"]
+    heads += ["RMSE, in the state's unit", "skill"]
+    note = (
+        "Undisturbed test recordings, all steps of the horizon, with 95 % intervals. Skill is 1 - "
+        "MSE / MSE of persistence. The file has every step."
+    )
+    return Table(f"{setup}: errors of forecasts", heads, lines, note, folded=True)
 
 
 def _share(value: float) -> str:

@@ -26,7 +26,12 @@ from odisar.report.figures.events import (
     has_faults,
     has_flagged,
 )
-from odisar.report.figures.forecasting import error_by_step, has_forecasts
+from odisar.report.figures.forecasting import (
+    error_by_step,
+    has_forecasts,
+    has_studied_forecasts,
+    studied_error_by_step,
+)
 from odisar.report.figures.leakage import leakage_panel
 from odisar.report.figures.learning import training_curves, tuning_trials
 from odisar.report.figures.onsets import score_around_onset
@@ -242,12 +247,20 @@ PLATES = (
     ),
     Plate(
         "forecast-error",
-        "Forecast error by step (from the study)",
-        "events",
+        "Forecast error by step",
+        "learning",
         "Root mean square error of forecasts of undisturbed test recordings by step, beside "
-        "simpler forecasters, from the study. The commands of the horizon are unknown to all.",
+        "forecasters that are fitted in seconds and know as much of the commands as the twin.",
         error_by_step,
         applies=has_forecasts,
+    ),
+    Plate(
+        "forecast-error-study",
+        "Forecast error by step (from the study)",
+        "learning",
+        "The same of more forecasters, each trained on equally many windows, fewer than the twin.",
+        studied_error_by_step,
+        applies=has_studied_forecasts,
     ),
     Plate(
         "recordings",

@@ -165,6 +165,11 @@ class Results:
         return self._result("reliability-curves")
 
     @cached_property
+    def forecast(self) -> pd.DataFrame:
+        """Errors of the twins' forecasts and of simpler forecasters, by state and step."""
+        return self._result("forecast")
+
+    @cached_property
     def leakage(self) -> pd.DataFrame:
         """What the leakage probes found about every detector of every twin."""
         return self._result("leakage")

@@ -63,6 +63,7 @@ def render_body(
             quality=overview.quality(results),
             learning=[
                 overview.training(results),
+                *(answers.forecasts(results, setup) for setup in results.setups),
                 overview.thresholds(results),
                 *(tables.parameters(results, setup) for setup in results.setups),
             ],

@@ -17,9 +17,11 @@ from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
 from odisar.evaluation.blame import named_by_chance
 from odisar.evaluation.cells import metadata_columns
+from odisar.evaluation.forecasts import ForecastErrors
 from odisar.evaluation.reliability import RecordingForecasts
 from odisar.evaluation.scored import ScoredRecording
 from odisar.recordings.schema import Recording, label_times
+from odisar.stages.accuracy import member_accuracy
 from odisar.stages.consequence import first_consequence
 from odisar.stages.detectors import MemberDetectors
 from odisar.stages.distributions import Distributions, draw_with_truth
@@ -55,7 +57,8 @@ class MemberResult:
 
     ``thresholds`` and ``promises`` are by rule and detector; ``assessed`` and ``nearness`` are
     rows of the tables they are named after; ``forecasts`` are distributions of undisturbed ones,
-    ``target_std`` (state,) what one scaled unit of them is in physical ones.
+    ``target_std`` (state,) what one scaled unit of them is in physical ones; ``accuracy`` is what
+    the twin and simpler forecasters err by.
     """
 
     scored: list[ScoredRecording]
@@ -67,6 +70,7 @@ class MemberResult:
     target_std: NDArray[np.float64]
     nearness: pd.DataFrame
     leakage: pd.DataFrame
+    accuracy: list[ForecastErrors]
 
     @property
     def scores(self) -> pd.DataFrame:
@@ -157,6 +161,7 @@ def evaluate_member(job: Job) -> MemberResult:
         target_std=data.scaler.target_std,
         nearness=nearness_table(job.member.name, data.splits, data.scaler, data.spec),
         leakage=leakage.assign(setup=job.member.setup, member=job.member.name),
+        accuracy=member_accuracy(data, found.scorer),
     )
 
 

@@ -1,7 +1,7 @@
 """Members: the twins of a set-up, one, or one for each fold where a case is cross-fitted."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from odisar.artifacts import Workspace
 from odisar.config.cases import Case
@@ -42,6 +42,10 @@ class MemberData:
     def windows(self, split: str, *, stride_steps: int = 1) -> WindowSet:
         """Return the windows of a split's recordings."""
         return WindowSet(self.splits[split], self.scaler, self.spec, stride_steps=stride_steps)
+
+    def knowing_commands(self, commands: tuple[int, ...]) -> "MemberData":
+        """Return the same data with these commands, and no other, known over the horizon."""
+        return replace(self, spec=replace(self.spec, known_ahead=commands))
 
 
 def setup_members(config: ConfigView, setup: str) -> list[Member]:

@@ -20,6 +20,7 @@ from odisar.evaluation.tables import (
 )
 from odisar.evaluation.threshold_tables import Ruled, threshold_table
 from odisar.seeding import derive_seed
+from odisar.stages.accuracy import accuracy_table
 from odisar.stages.assessing import MemberResult
 
 #: The pairs of the default run; the study has all of them.
@@ -62,6 +63,10 @@ def _case_tables(config: ConfigView, name: str, mine: Results) -> dict[str, pd.D
         "attribution": attribution_table(assessed, case.groups),
         "blame": blame_table(assessed, cfg, seed),
         **_reliability(config, case, mine, seed),
+        "forecast": pd.concat(
+            accuracy_table(s, [p.accuracy for p in parts], case.output_names, cfg, seed)
+            for s, parts in mine.items()
+        ),
         "nearness": pd.concat([part.nearness for parts in mine.values() for part in parts]),
         "leakage": pd.concat([part.leakage for parts in mine.values() for part in parts]),
     }

@@ -11,11 +11,8 @@ import torch
 from odisar.config.loader import ConfigView
 from odisar.config.study import FitConfig
 from odisar.fitting import FitBudget
-from odisar.forecasters.constant_velocity import ConstantVelocity
-from odisar.forecasters.direct_linear import DirectLinear
 from odisar.forecasters.gru import GruForecaster, GruSize
 from odisar.forecasters.interface import Forecaster
-from odisar.forecasters.persistence import Persistence
 from odisar.forecasters.pilot import (
     GanForecaster,
     GenerativeSize,
@@ -24,15 +21,13 @@ from odisar.forecasters.pilot import (
     VaeForecaster,
 )
 from odisar.forecasters.published_mixer import MixerForecaster, MixerSize
+from odisar.forecasters.registry import cheap_forecasters
 from odisar.seeding import derive_seed
 from odisar.stages.members import MemberData
 from odisar.twin.plan import TrainingPlan
 from odisar.twin.training import train_twin
 from odisar.windows.window_set import WindowSet
 
-#: A step of a forecaster sees this many windows of the twin's; validation every so many steps.
-_LAGS_STEPS, _PENALTIES = (10, 30, 60), (1e-6, 1e-4, 1e-2, 1.0)
-_SLOPE_STEPS, _DAMPINGS = (1, 3, 5, 10), (0.0, 0.5, 0.8, 0.9, 0.95, 0.98)
 #: Epochs into which a twin's share of the budget is divided.
 _EPOCHS = 6
 
@@ -106,15 +101,9 @@ def simple_forecasters(
     config: ConfigView, data: MemberData, fit: FitConfig
 ) -> dict[str, Callable[[], Forecaster]]:
     """Return what makes each forecaster that is no twin, by name; ``data.spec`` says the rest."""
-    scaler, spec, rate_hz = data.scaler, data.spec, data.case.rate_hz
     budget, seed = FitBudget(**fit.model_dump()), derive_seed(config.seed, "forecasters")
     mixer = MixerSize(config.twin.patch_steps, 32, 3, 0.1)
-    return {
-        "persistence": lambda: Persistence(scaler, spec),
-        "constant-velocity": lambda: ConstantVelocity(
-            scaler, spec, rate_hz, _SLOPE_STEPS, _DAMPINGS
-        ),
-        "closed-form": lambda: DirectLinear(scaler, spec, _LAGS_STEPS, _PENALTIES),
+    return cheap_forecasters(data.scaler, data.spec, data.case.rate_hz) | {
         "gru": lambda: GruForecaster(GruSize(64, 128), budget, seed),
         "patch-ts-mixer": lambda: MixerForecaster(mixer, budget, seed),
     }

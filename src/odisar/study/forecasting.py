@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +28,10 @@ from odisar.study.forecast_models import (
 )
 from odisar.study.places import study_folder
 from odisar.twin.devices import use_one_thread
-from odisar.windows.scaling import Scaler
 from odisar.windows.window_set import WindowSet
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "twin", "training", "evaluation", "study")
 
-#: Undisturbed test windows start every quarter of a horizon; the table has so many steps.
-_STARTS_PER_HORIZON, _STEPS_SHOWN = 4, 12
 _VALIDATION_STRIDE = 30
 _PILOT_TRANSFORMER = "paper-transformer"
 _TREES = TreePlan(rows=20_000, trees=200, learning_rate=0.1, leaves=31, rows_per_leaf=40)
@@ -78,12 +75,6 @@ def run(config: ConfigView, workspace: Workspace, setup: str) -> None:
     write_table(workspace.study_results / f"nonlinearity-{setup}.csv", table)
 
 
-def _known_ahead(data: MemberData, *, known_ahead: bool) -> MemberData:
-    """Return the data of a case whose commands are planned over the horizon, or are not."""
-    spec = replace(data.spec, known_ahead=data.spec.commands if known_ahead else ())
-    return replace(data, spec=spec, scaler=Scaler.fit(data.splits["train"], spec))
-
-
 def _fit(job: _Job) -> None:
     use_one_thread()
     workspace, config = Workspace(job.root), job.config
@@ -91,7 +82,7 @@ def _fit(job: _Job) -> None:
     if path.with_suffix(".json").exists():
         return
     data = load_member(config, workspace, Member(job.setup, None))
-    data = _known_ahead(data, known_ahead=job.known_ahead)
+    data = data.knowing_commands(data.spec.commands if job.known_ahead else ())
     train = data.windows("train")
     validation = data.windows("validation", stride_steps=_VALIDATION_STRIDE)
     fit = config.study.forecasters if job.kind == "forecasters" else config.study.pilot
@@ -111,8 +102,7 @@ def _fit(job: _Job) -> None:
         facts = {"cpu_s": fit_timed(forecaster, train, validation)}
         forecast = forecaster.forecast
     clean = [item for item in data.splits["test"] if not item.info.is_disturbed]
-    stride = max(1, data.spec.horizon_steps // _STARTS_PER_HORIZON)
-    errors = forecast_errors(clean, data.scaler, data.spec, {job.name: forecast}, stride)
+    errors = forecast_errors(clean, data.scaler, data.spec, {job.name: forecast})
     path.parent.mkdir(parents=True, exist_ok=True)
     np.savez(path.with_suffix(".npz"), squares=errors.squares[job.name], windows=errors.windows)
     write_json(path.with_suffix(".json"), {**facts, "clusters": list(errors.clusters)})
@@ -133,11 +123,10 @@ def _table(
             squares[job.name], windows = stored["squares"], stored["windows"]
         clusters = tuple(read_json(path.with_suffix(".json"))["clusters"])
     ahead = "known-ahead" if jobs[0].known_ahead else "unknown"
-    errors = ForecastErrors(squares, windows, clusters, data.scaler.target_std, ahead)
-    horizon = data.spec.horizon_steps
-    steps = sorted({1, *np.linspace(1, horizon, _STEPS_SHOWN).round().astype(int).tolist()})
+    scale = np.tile(data.scaler.target_std, (len(windows), 1))
+    errors = ForecastErrors(squares, windows, clusters, scale, ahead)
     names = data.case.output_names
-    return forecast_table(jobs[0].setup, errors, names, steps, config.evaluation, seed)
+    return forecast_table(jobs[0].setup, errors, names, config.evaluation, seed)
 
 
 def _training_times(workspace: Workspace, jobs: Sequence[_Job]) -> pd.DataFrame:

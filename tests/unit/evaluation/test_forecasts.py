@@ -8,9 +8,8 @@ from odisar.errors import OdisarError
 from odisar.evaluation.forecasts import (
     ALL_STATES,
     FORECAST_COLUMNS,
-    FORECAST_PAIR_COLUMNS,
+    ForecastErrors,
     forecast_errors,
-    forecast_pairs,
     forecast_table,
 )
 from odisar.windows.scaling import Scaler
@@ -35,12 +34,12 @@ def zero(context, _known):
 FORECASTERS = {"persistence": last_value, "zero": zero}
 
 
-def errors_of(recordings=RECORDINGS, forecasters=None, stride=1, spec=SPEC):
-    return forecast_errors(recordings, SCALER, spec, forecasters or FORECASTERS, stride)
+def errors_of(recordings=RECORDINGS, forecasters=None, spec=SPEC, scaler=SCALER):
+    return forecast_errors(recordings, scaler, spec, forecasters or FORECASTERS)
 
 
-def table_of(errors, steps=(1, 10)):
-    return forecast_table("system", errors, STATES, steps, CONFIG, 1)
+def table_of(errors):
+    return forecast_table("system", errors, STATES, CONFIG, 1)
 
 
 def cell(table, forecaster, state, step):
@@ -51,11 +50,11 @@ def cell(table, forecaster, state, step):
 
 def test_errors_are_those_of_all_windows_pooled():
     table = table_of(errors_of())
-    windows = WindowSet(RECORDINGS, SCALER, SPEC)
+    windows = WindowSet(RECORDINGS, SCALER, SPEC, stride_steps=2)
     batch = windows.gather(torch.arange(len(windows)))
     missed = (last_value(batch.context, None) - batch.truth).double().numpy()
     assert list(table.columns) == list(FORECAST_COLUMNS)
-    assert len(table) == 2 * 3 * 3
+    assert len(table) == 2 * 3 * (1 + SPEC.horizon_steps)
     row = cell(table, "persistence", "Turn Rate", 10)
     expected = np.sqrt(np.mean(missed[:, 9, 1] ** 2))
     assert row.rmse == pytest.approx(expected, rel=1e-6)
@@ -77,9 +76,28 @@ def test_skill_is_counted_from_persistence():
     assert alone.skill.isna().all()
 
 
-def test_a_stride_takes_fewer_windows_of_every_recording():
-    every, third = errors_of(), errors_of(stride=3)
-    np.testing.assert_array_equal(third.windows, np.ceil(every.windows / 3))
+def test_of_a_long_horizon_first_last_and_some_steps_between_are_shown():
+    spec = replace(SPEC, horizon_steps=25)
+    table = table_of(
+        errors_of(forecasters={"zero": lambda c, _: np.zeros((len(c), 25, 2))}, spec=spec)
+    )
+    steps = table.step.unique()
+    assert len(steps) == 13
+    assert {0, 1, 25} <= set(steps)
+    windows = [len(WindowSet([item], SCALER, spec, stride_steps=6)) for item in RECORDINGS]
+    assert set(table.windows) == {sum(windows)}
+
+
+def test_folds_are_pooled_each_in_its_own_scale():
+    wide = replace(SCALER, target_std=2 * SCALER.target_std)
+    parts = [errors_of(RECORDINGS[:2]), errors_of(RECORDINGS[2:], scaler=wide)]
+    table, whole = table_of(ForecastErrors.joined(parts)), table_of(errors_of())
+    row, same = (cell(one, "persistence", "Speed", 10) for one in (table, whole))
+    # "zero" forecasts the mean, which the wider scale doesn't move: physically nothing changes.
+    physical = [cell(one, "zero", "Speed", 10).rmse_physical for one in (table, whole)]
+    assert physical[0] == pytest.approx(physical[1], rel=1e-6)
+    assert (row.recordings, row.windows) == (same.recordings, same.windows)
+    assert row.rmse != pytest.approx(same.rmse, rel=1e-3)
 
 
 def test_order_of_recordings_and_batches_has_no_influence():
@@ -124,28 +142,6 @@ def test_an_answer_of_another_shape_is_refused():
         errors_of(forecasters={"broken": lambda context, _: context[:, :1, 1:]})
 
 
-def test_steps_and_states_that_are_not_forecast_are_refused():
-    with pytest.raises(OdisarError, match="steps 1 to 10"):
-        table_of(errors_of(), steps=(11,))
+def test_states_that_are_not_forecast_are_refused():
     with pytest.raises(OdisarError, match="2 states"):
-        forecast_table("system", errors_of(), ("Speed",), (1,), CONFIG, 1)
-
-
-def test_a_pair_is_compared_on_the_same_draws():
-    def worse(context, known):
-        truth = last_value(context, known)
-        return truth + 1e-3
-
-    errors = errors_of(forecasters={"persistence": last_value, "double": zero, "worse": worse})
-    pairs = forecast_pairs("system", errors, CONFIG, 1)
-    assert list(pairs.columns) == list(FORECAST_PAIR_COLUMNS)
-    assert len(pairs) == 3
-    row = pairs[pairs.against == "worse"].iloc[0]
-    table = table_of(errors)
-    ratio = (
-        cell(table, "persistence", ALL_STATES, 0).rmse / cell(table, "worse", ALL_STATES, 0).rmse
-    ) ** 2
-    assert row.mse_ratio == pytest.approx(ratio)
-    # Each alone varies by far more than their ratio does.
-    alone = cell(table, "worse", ALL_STATES, 0)
-    assert row.ci_high - row.ci_low < 0.05 * (alone.ci_high - alone.ci_low) / alone.rmse
+        forecast_table("system", errors_of(), ("Speed",), CONFIG, 1)

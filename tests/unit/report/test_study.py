@@ -1,7 +1,7 @@
 import pytest
 
 from odisar.report.figures.baselines import has_study_networks
-from odisar.report.figures.forecasting import error_by_step, has_forecasts
+from odisar.report.figures.forecasting import has_studied_forecasts, studied_error_by_step
 from odisar.report.figures.leakage import probed
 from odisar.report.load import study_folder
 from odisar.report.page import render_body
@@ -20,7 +20,7 @@ def test_without_the_study_the_report_says_what_is_missing_and_shows_nothing_of_
     assert study_tables(results) == []
     (sentence,) = missing_study(results)
     assert all(given.title in sentence for given in STUDY_TABLES)
-    assert not has_forecasts(results, "vessel-all")
+    assert not has_studied_forecasts(results, "vessel-all")
     assert not has_study_networks(results, "vessel-all")
     assert "one training seed" in seed_sentences(results)[0]
     assert "Not in this report, because the full study" in render_body(results, [], [], [])
@@ -62,7 +62,7 @@ def test_the_published_recipe_stands_in_the_leakage_panel_as_it_failed(studied):
 
 
 def test_forecast_errors_are_drawn_by_step_in_seconds_without_the_pooled_steps(studied):
-    axes = error_by_step(studied, "vessel-all").axes[0]
+    axes = studied_error_by_step(studied, "vessel-all").axes[0]
     assert len(axes.lines) == 3
     assert list(axes.lines[0].get_xdata()) == [1.0, 10.0, 30.0, 60.0]
     assert axes.get_title() == "all states [scaled]"

@@ -1,4 +1,4 @@
-"""How well the horizon is forecast, step by step, beside simpler forecasters (from the study)."""
+"""How well the horizon is forecast, step by step, beside other forecasters."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,9 @@ from odisar.report.style import figure_style
 ALL_STATES, ALL_STEPS = "all", 0
 #: The commands of the horizon were not given to the forecasters.
 _UNKNOWN = "unknown"
+TWIN = "twin"
 FORECASTER_NAMES = {
+    TWIN: "the twin",
     "paper-transformer": "Transformer, paper's parameters",
     "transformer": "Transformer, plain loss",
     "weighed-transformer": "Transformer, weighed loss (the twin's)",
@@ -45,14 +47,39 @@ _ACROSS = 3
 
 
 def has_forecasts(results: Results, setup: str) -> bool:
+    """Whether undisturbed test recordings hold windows to forecast."""
+    return bool((results.forecast.setup == setup).any())
+
+
+def has_studied_forecasts(results: Results, setup: str) -> bool:
     """Whether the study has judged forecasts of this set-up."""
     table = results.study("forecast")
     return table is not None and bool((table.setup == setup).any())
 
 
 def error_by_step(results: Results, setup: str) -> Figure:
+    """Draw the twin's error over the steps ahead, beside forecasters that know as much as it."""
+    table = results.forecast[results.forecast.setup == setup]
+    known = table[table.forecaster == TWIN].commands
+    return _drawn(results, setup, table[table.commands.isin(known)])
+
+
+def studied_error_by_step(results: Results, setup: str) -> Figure:
+    """Draw the same of every forecaster of the study.
+
+    Of those that do not know the commands of the horizon, unless all of them do: that is how the
+    twin is run.
+    """
+    table = results.study("forecast")
+    assert table is not None  # noqa: S101 (has_studied_forecasts has looked)
+    table = table[table.setup == setup]
+    unknown = table[table.commands == _UNKNOWN]
+    return _drawn(results, setup, table if unknown.empty else unknown)
+
+
+def _drawn(results: Results, setup: str, table: pd.DataFrame) -> Figure:
     """Draw each forecaster's error over the steps ahead: all states, and each in its unit."""
-    table = forecasts_of(results, setup)
+    table = table[table.step != ALL_STEPS]
     states = sorted(table.state.unique(), key=lambda state: state != ALL_STATES)
     forecasters = list(dict.fromkeys(table.forecaster))
     units = {channel.name: channel.unit for channel in results.case_of(setup).channels}
@@ -73,19 +100,6 @@ def error_by_step(results: Results, setup: str) -> Figure:
         figure.supylabel("root mean square error", fontsize=9)
         _legend(figure, forecasters)
     return figure
-
-
-def forecasts_of(results: Results, setup: str) -> pd.DataFrame:
-    """Return a set-up's errors by single steps.
-
-    Of forecasters that do not know the commands of the horizon, unless all of them do: that is how
-    the twin is run.
-    """
-    table = results.study("forecast")
-    assert table is not None  # noqa: S101 (has_forecasts has looked)
-    table = table[(table.setup == setup) & (table.step != ALL_STEPS)]
-    unknown = table[table.commands == _UNKNOWN]
-    return table if unknown.empty else unknown
 
 
 def forecaster_name(forecaster: str) -> str:
