@@ -16,6 +16,7 @@ from odisar.stages.detectors import member_reference
 from odisar.stages.leakage import probe, probed_recordings
 from odisar.stages.members import load_member, setup_members
 from odisar.study.alternatives import all_alternatives
+from odisar.twin.bundle import read_twin
 from odisar.windows.scaling import channel_std
 
 #: Share of its steps that a network is trained for before it is probed.
@@ -32,9 +33,11 @@ def run(config: ConfigView, workspace: Workspace) -> None:
     trained for a share of their steps.
     """
     setup = config.study.setups[0]
-    data = load_member(config, workspace, setup_members(config, setup)[0])
+    member = setup_members(config, setup)[0]
+    data = load_member(config, workspace, member)
     reference = member_reference(data, config.seed)
-    short, full = (all_alternatives(config, share=share) for share in (_TRAINED_SHARE, 1.0))
+    twin = read_twin(workspace.twin(member.name))
+    short, full = (all_alternatives(config, twin, share) for share in (_TRAINED_SHARE, 1.0))
     reports = []
     for name in sorted(short, key=NOT_DEPLOYABLE.__contains__):
         detector = (full if name in NOT_DEPLOYABLE else short)[name]()

@@ -1,5 +1,7 @@
 """Every alternative is probed; all but the published recipe after a short training."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -37,7 +39,7 @@ def probed(monkeypatch, tmp_path, config):
     """Return the written table, and by share the names of what was made at that size."""
     made: dict[float, list[str]] = {}
 
-    def stands(_, share):
+    def stands(_config, _twin, share):
         def make(name, shift):
             made.setdefault(share, []).append(name)
             return Stand(shift)
@@ -50,6 +52,7 @@ def probed(monkeypatch, tmp_path, config):
     data = MemberData(small_case(), splits, Scaler.fit(train, SPEC), SPEC)
     monkeypatch.setattr(leakage, "load_member", lambda *_: data)
     monkeypatch.setattr(leakage, "all_alternatives", stands)
+    monkeypatch.setattr(leakage, "read_twin", lambda _: None)
     leakage.run(config, Workspace(tmp_path))
     return pd.read_csv(Workspace(tmp_path).study_results / "leakage.csv"), made
 
@@ -68,14 +71,21 @@ def test_only_the_recipe_is_trained_whole(probed):
     assert made == {0.1: ["honest"], 1.0: [NOT_DEPLOYABLE[0]]}
 
 
-def test_a_share_is_one_of_the_steps(monkeypatch, config):
+def test_a_share_is_one_of_the_steps(monkeypatch, config, trained_twin):
     budgets = []
     monkeypatch.setattr(
         alternatives, "neural_detectors", lambda budget: budgets.append(budget) or {}
     )
-    alternatives.all_alternatives(config, share=0.1)
-    alternatives.all_alternatives(config)
+    alternatives.all_alternatives(config, trained_twin, share=0.1)
+    alternatives.all_alternatives(config, trained_twin)
     assert [budget.steps for budget in budgets] == [
         round(0.1 * config.study.detectors.steps),
         config.study.detectors.steps,
     ]
+
+
+def test_draws_of_a_twin_that_must_know_commands_are_no_alternative(config, trained_twin):
+    names = alternatives.all_alternatives(config, trained_twin)
+    assert alternatives.DROPOUT_VARIANCE in names
+    knowing = replace(trained_twin, spec=replace(SPEC, known_ahead=(0,)))
+    assert alternatives.DROPOUT_VARIANCE not in alternatives.all_alternatives(config, knowing)
