@@ -140,9 +140,9 @@ def twin() -> dict[str, Any]:
 
 def analytic_scores() -> InnovationScores:
     """Return innovation scores that were fitted on nothing."""
-    mean = MeanInnovation(4, np.array([[2.0, 0.3], [0.3, 1.0]]), LogScale(-0.5, 1.5))
+    mean = MeanInnovation(4, np.array([[2.0, 0.3], [0.3, 1.0]]), LogScale(-0.5, 1.5), None)
     size = InnovationSize(2, np.array([[1.5, -0.2], [-0.2, 0.8]]), LogScale(-0.7, 0.9))
-    recent = MeanInnovation(2, np.array([[0.9, 0.1], [0.1, 0.7]]), LogScale(-0.8, 1.9))
+    recent = MeanInnovation(2, np.array([[0.9, 0.1], [0.1, 0.7]]), LogScale(-0.8, 1.9), None)
     return InnovationScores(
         InnovationScore(mean, size, recent, 0.3, LogScale(-0.2, 0.1)),
         InnovationScore(mean, size, recent, 0.3, None),

@@ -7,7 +7,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-import jsonschema
 import numpy as np
 from numpy.typing import NDArray
 
@@ -180,6 +179,9 @@ def assessments_json(assessments: Sequence[Assessment]) -> str:
 
     Raises OdisarError where one does not fit it (a NaN score, say).
     """
+    # Takes as long to import as everything else here; many need assessments, few write them.
+    import jsonschema  # noqa: PLC0415
+
     rows = [asdict(assessment) for assessment in assessments]
     validator = jsonschema.Draft202012Validator(assessment_schema())
     for row in rows:

@@ -5,7 +5,13 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from odisar.capability.innovations import InnovationScore, InnovationSize, LogScale, MeanInnovation
+from odisar.capability.innovations import (
+    InnovationLimit,
+    InnovationScore,
+    InnovationSize,
+    LogScale,
+    MeanInnovation,
+)
 from odisar.capability.scoring import InnovationScores
 from odisar.config.base import PositiveInt, Section
 
@@ -26,12 +32,10 @@ class ScaleValues(Section):
         return self
 
 
-class StatisticValues(Section):
-    """One statistic of innovations: its window, the inverse covariance, its log scale."""
+class _Covariant(Section):
+    """Anything with an inverse covariance."""
 
-    steps: PositiveInt
     precision: list[list[_Number]]
-    scale: ScaleValues
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -40,12 +44,31 @@ class StatisticValues(Section):
         return self
 
 
+class LimitValues(_Covariant):
+    """How far out single innovations may count."""
+
+    distance: Annotated[float, Field(gt=0, le=_NUMBER_LIMIT)]
+
+
+class StatisticValues(_Covariant):
+    """One statistic of innovations: its window, the inverse covariance, its log scale."""
+
+    steps: PositiveInt
+    scale: ScaleValues
+
+
+class MeanValues(StatisticValues):
+    """T2 of a mean; bundles of before there was a limit have none."""
+
+    limit: LimitValues | None = None
+
+
 class InnovationValues(Section):
     """One innovation score."""
 
-    mean: StatisticValues
+    mean: MeanValues
     size: StatisticValues
-    recent: StatisticValues
+    recent: MeanValues
     recent_share: Annotated[float, Field(ge=0, lt=1)]
     reconstruction: ScaleValues | None
 
@@ -54,9 +77,9 @@ class InnovationValues(Section):
         """Return the numbers of a fitted score."""
         rebuilt = score.reconstruction
         return cls(
-            mean=_values(score.mean),
-            size=_values(score.size),
-            recent=_values(score.recent),
+            mean=_mean_values(score.mean),
+            size=StatisticValues(**_values(score.size)),
+            recent=_mean_values(score.recent),
             recent_share=score.recent_share,
             reconstruction=None if rebuilt is None else ScaleValues(**vars(rebuilt)),
         )
@@ -65,9 +88,9 @@ class InnovationValues(Section):
         """Return the score."""
         rebuilt = self.reconstruction
         return InnovationScore(
-            MeanInnovation(**_arguments(self.mean)),
+            _mean(self.mean),
             InnovationSize(**_arguments(self.size)),
-            MeanInnovation(**_arguments(self.recent)),
+            _mean(self.recent),
             self.recent_share,
             None if rebuilt is None else LogScale(**rebuilt.model_dump()),
         )
@@ -94,20 +117,38 @@ class InnovationScoreValues(Section):
     @property
     def states(self) -> set[int]:
         """How many state features the covariances are of; more than one number fits no twin."""
-        parts = [
-            part
-            for score in (self.twin, self.closed_form)
-            for part in (score.mean, score.size, score.recent)
-        ]
+        parts: list[_Covariant] = []
+        for score in (self.twin, self.closed_form):
+            parts += [score.mean, score.size, score.recent]
+            parts += [mean.limit for mean in (score.mean, score.recent) if mean.limit is not None]
         return {len(part.precision) for part in parts}
 
 
-def _values(part: MeanInnovation | InnovationSize) -> StatisticValues:
-    return StatisticValues(
-        steps=part.steps,
-        precision=part.precision.tolist(),
-        scale=ScaleValues(**vars(part.scale)),
+def _mean_values(part: MeanInnovation) -> MeanValues:
+    limit = part.limit
+    given = (
+        None
+        if limit is None
+        else {
+            "precision": limit.precision.tolist(),
+            "distance": limit.distance,
+        }
     )
+    return MeanValues.model_validate({**_values(part), "limit": given})
+
+
+def _values(part: MeanInnovation | InnovationSize) -> dict[str, Any]:
+    return {
+        "steps": part.steps,
+        "precision": part.precision.tolist(),
+        "scale": ScaleValues(**vars(part.scale)),
+    }
+
+
+def _mean(values: MeanValues) -> MeanInnovation:
+    limit = values.limit
+    built = None if limit is None else InnovationLimit(np.array(limit.precision), limit.distance)
+    return MeanInnovation(**_arguments(values), limit=built)
 
 
 def _arguments(values: StatisticValues) -> dict[str, Any]:

@@ -4,10 +4,11 @@ At time t the forecast of x(t) that was made from samples up to t - 1 is compare
 innovation of state estimation (Bar-Shalom, Li and Kirubarajan, 2001, section 5.4). Two statistics
 of the last innovations look for two kinds of change: T2 of their mean (Hotelling, 1947) grows when
 they lean one way (a bias, a current), the size of the one that scatters most, given all others,
-when a sensor gets noisy. Their covariance comes from recordings that no weight was fitted to. Each
-statistic, and beside them the reconstruction error of the twin's own forecast (the paper's score),
-is put on the same scale, its log against what is usual on those recordings, and the largest one
-counts: a user need not know in advance which kind of change will come.
+when a sensor gets noisy. A single one that stands out, such as the start of a manoeuvre leaves, is
+cut back before the mean is taken. Their covariance comes from recordings that no weight was fitted
+to. Each statistic, and beside them the reconstruction error of the twin's own forecast (the paper's
+score), is put on the same scale, its log against what is usual on those recordings, and the largest
+one counts: a user need not know in advance which kind of change will come.
 """
 
 from collections.abc import Sequence
@@ -26,6 +27,8 @@ FloatArray = NDArray[np.float64]
 _SHRINKAGE = 1.0e-6
 #: What is usual and what is rare on held-out recordings: 0 and 1 on the common scale.
 _USUAL, _RARE = 0.5, 0.99
+#: Single innovations that fewer held-out ones than this exceed are cut back.
+_OUTLYING = 0.95
 #: Below it a statistic is called zero; its log must stay finite.
 _SMALLEST = 1.0e-12
 
@@ -91,23 +94,63 @@ class LogScale:
 
 
 @dataclass(frozen=True)
+class InnovationLimit:
+    """How far from zero, by Mahalanobis distance, a single innovation may count.
+
+    Huber's psi for vectors (Maronna, Annals of Statistics 1976): what lies further out keeps its
+    direction and is drawn in to the limit. A lasting change shows in every sample and hardly loses
+    by it; one start or stop no longer rules a mean for as long as it is in the window.
+    """
+
+    precision: FloatArray
+    distance: float
+
+    @classmethod
+    def fit(cls, runs: Sequence[FloatArray]) -> Self:
+        """Fit on gapless runs (time, state) of held-out innovations."""
+        every = np.concatenate(list(runs))
+        precision = fit_precision(every)
+        squares = squared_distance(every, precision)
+        return cls(precision, float(np.sqrt(np.quantile(squares[np.isfinite(squares)], _OUTLYING))))
+
+    def of(self, innovations: FloatArray) -> FloatArray:
+        """Return (time, state) innovations, none of them further out than the limit."""
+        distances = np.sqrt(squared_distance(innovations, self.precision))
+        return (
+            innovations * np.minimum(1.0, self.distance / np.maximum(distances, _SMALLEST))[:, None]
+        )
+
+
+@dataclass(frozen=True)
 class MeanInnovation:
-    """T2 of the mean of the last ``steps`` innovations; ``precision`` (state, state) is its own."""
+    """T2 of the mean of the last ``steps`` innovations; ``precision`` (state, state) is its own.
+
+    Single ones are cut back to ``limit``, if there is one.
+    """
 
     steps: int
     precision: FloatArray
     scale: LogScale
+    limit: InnovationLimit | None
 
     @classmethod
-    def fit(cls, runs: Sequence[FloatArray], steps: int) -> Self:
+    def fit(cls, runs: Sequence[FloatArray], steps: int, limit: InnovationLimit | None) -> Self:
         """Fit on gapless runs (time, state) of held-out innovations."""
-        means = np.concatenate([moving_mean(run, steps) for run in runs])
+        means = np.concatenate([_means(run, steps, limit) for run in runs])
         precision = fit_precision(means)
-        return cls(steps, precision, LogScale.fit(squared_distance(means, precision)))
+        return cls(steps, precision, LogScale.fit(squared_distance(means, precision)), limit)
+
+    def means(self, innovations: FloatArray) -> FloatArray:
+        """Return (time, state) means along one gapless run; NaN until enough are known."""
+        return _means(innovations, self.steps, self.limit)
 
     def statistic(self, innovations: FloatArray) -> FloatArray:
         """Return (time,) T2 along one gapless run (time, state); NaN until enough are known."""
-        return squared_distance(moving_mean(innovations, self.steps), self.precision)
+        return squared_distance(self.means(innovations), self.precision)
+
+
+def _means(innovations: FloatArray, steps: int, limit: InnovationLimit | None) -> FloatArray:
+    return moving_mean(innovations if limit is None else limit.of(innovations), steps)
 
 
 @dataclass(frozen=True)
@@ -189,9 +232,10 @@ class InnovationScore:
         """
         scale = None if reconstructions is None else LogScale.fit(np.concatenate(reconstructions))
         return cls(
-            MeanInnovation.fit(runs, steps.mean),
+            MeanInnovation.fit(runs, steps.mean, InnovationLimit.fit(runs)),
             InnovationSize.fit(runs, steps.size),
-            MeanInnovation.fit(runs, steps.recent),
+            # Of so few the last one has to count for what it is.
+            MeanInnovation.fit(runs, steps.recent, None),
             steps.recent_share,
             scale,
         )

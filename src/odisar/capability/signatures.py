@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from odisar.capability.innovations import FloatArray, InnovationScore, moving_mean
+from odisar.capability.innovations import FloatArray, InnovationScore
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 
@@ -102,7 +102,7 @@ class Signatures:
         self, innovations: FloatArray, windows: NDArray[np.int64], directions: FloatArray
     ) -> FloatArray:
         mean = self.score.mean
-        means = moving_mean(innovations, mean.steps)[windows]
+        means = mean.means(innovations)[windows]
         ends = [directions @ response.T for response in (self.response[0], self.response[-1])]
         explained = [_explained(means, end, mean.precision) for end in ends]
         return np.asarray(np.max(explained, axis=0))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from odisar.artifacts import Workspace, write_table
 from odisar.capability.innovations import (
     FloatArray,
+    InnovationLimit,
     InnovationSize,
     LogScale,
     MeanInnovation,
@@ -36,7 +37,7 @@ PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "study")
 
 #: Steps of the windows that are tried, and leads of forecasts that are compared with now.
 _WINDOWS, _LEADS = (1, 3, 5, 10, 20), (5, 10)
-_WEIGHTS, _SIZES = (0.1, 0.3), (3, 5, 10)
+_WEIGHTS, _SIZES, _LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
 
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
@@ -54,6 +55,7 @@ class Candidate:
 def candidates() -> list[Candidate]:
     """Return every candidate, in the order of the table."""
     singles = [f"T2 of mean over {k}" for k in _WINDOWS]
+    singles += [f"T2 of limited mean over {k}" for k in _LIMITED]
     singles += [f"T2 of exponential mean, weight {a:g}" for a in _WEIGHTS]
     singles += [f"log NIS over {k}" for k in _SIZES] + ["log NIS over 5, by regime"]
     singles += [f"size of one state over {k}" for k in _SIZES]
@@ -61,16 +63,27 @@ def candidates() -> list[Candidate]:
     singles += [RECONSTRUCTION]
     made = [Candidate(name, 1, lambda s, n=name: s[n]) for name in singles]  # type: ignore[misc]
     for label, size in (("", "log NIS over 5"), (" of one state", "size of one state over 10")):
-        both = ("T2 of mean over 10", size)
-        made += _combined(label, both, (*both, RECONSTRUCTION))
-    return made
+        made += _combined(label, "T2 of mean over 10", size)
+    return made + [_limited(steps, size) for steps in _LIMITED for size in _SIZES]
 
 
-def _combined(label: str, both: tuple[str, ...], three: tuple[str, ...]) -> list[Candidate]:
+def _limited(steps: int, size: int) -> Candidate:
+    """Return one that takes the largest of three, of a mean that single innovations can't rule."""
+    three = (f"T2 of limited mean over {steps}", f"size of one state over {size}", RECONSTRUCTION)
+    name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
+    return Candidate(
+        f"{name}; recent mean over 5 (.7, .3)",
+        4,
+        lambda s: 0.7 * _largest(s, three) + 0.3 * _largest(s, ("T2 of mean over 5",)),
+    )
+
+
+def _combined(label: str, mean: str, size: str) -> list[Candidate]:
     """Return candidates that take the largest of several statistics, without and with recent ones.
 
     Recent ones let go sooner when a disturbance has ended.
     """
+    both, three = (mean, size), (mean, size, RECONSTRUCTION)
     recent = ("T2 of mean over 3",)
     sizes = ("T2 of mean over 3", "size of one state over 3")
     name = f"largest of mean, size{label}, reconstruction"
@@ -169,8 +182,12 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
     runs = [s.innovations[a + 1 : b] for _, s in held_out for a, b in s.runs]
     raw: dict[str, Maker] = {}
     for steps in _WINDOWS:
-        mean = MeanInnovation.fit(runs, steps)
+        mean = MeanInnovation.fit(runs, steps, None)
         raw[f"T2 of mean over {steps}"] = _along(mean.statistic)
+    limit = InnovationLimit.fit(runs)
+    for steps in _LIMITED:
+        mean = MeanInnovation.fit(runs, steps, limit)
+        raw[f"T2 of limited mean over {steps}"] = _along(mean.statistic)
     for weight in _WEIGHTS:
         raw[f"T2 of exponential mean, weight {weight:g}"] = _along(_exponential(runs, weight))
     for steps in _SIZES:

@@ -17,6 +17,8 @@ def fitted(states: int = 2) -> InnovationScores:
     random = generator(5, "values")
     steps = InnovationSteps(mean=6, size=4, recent=2, recent_share=0.25)
     runs, rebuilt = [random.normal(size=(200, states))], [np.exp(random.normal(size=200))]
+    # One that stands out, so that the limit counts.
+    runs[0][50] *= 20
     return InnovationScores(
         InnovationScore.fit(runs, rebuilt, steps), InnovationScore.fit(runs, None, steps)
     )
@@ -55,6 +57,12 @@ def test_without_a_reconstruction_the_mapping_says_null(content):
     assert set(content["twin"]["reconstruction"]) == {"usual", "rare"}
 
 
+def test_bundles_of_before_there_was_a_limit_have_none(content):
+    assert content["twin"]["recent"]["limit"] is None
+    del content["twin"]["mean"]["limit"]
+    assert InnovationScoreValues.model_validate(content).build().twin.mean.limit is None
+
+
 @pytest.mark.parametrize(
     ("place", "value", "complaint"),
     [
@@ -66,6 +74,9 @@ def test_without_a_reconstruction_the_mapping_says_null(content):
         (("mean", "scale"), {"usual": 2.0, "rare": 2.0}, "must be above usual=2.0"),
         (("reconstruction",), {"usual": 0.0, "rare": float("nan")}, "rare"),
         (("mean", "scale"), {"usual": float("-inf"), "rare": 0.0}, "usual"),
+        (("mean", "limit", "distance"), 0.0, "greater than 0"),
+        (("mean", "limit", "precision"), [[1.0, 0.0]], "expected 1 numbers in each row"),
+        (("size", "limit"), None, "Extra inputs"),
         (("size", "steps"), 0, "greater than 0"),
         (("size", "steps"), 2.5, "valid integer"),
         (("recent_share",), 1.0, "less than 1"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from odisar.capability.innovations import (
+    InnovationLimit,
     InnovationScore,
     InnovationSize,
     InnovationSteps,
@@ -60,7 +61,7 @@ def test_a_mean_with_a_missing_value_is_missing_and_no_other_is():
 
 def test_t2_is_the_mean_innovation_in_its_own_covariance():
     run, fresh = usual("a"), usual("fresh", 40)
-    part = MeanInnovation.fit([run], 10)
+    part = MeanInnovation.fit([run], 10, None)
     held_out = np.array([run[at - 9 : at + 1].mean(axis=0) for at in range(9, len(run))])
     precision = np.linalg.inv(held_out.T @ held_out / len(held_out))
     found = part.statistic(fresh)
@@ -68,6 +69,38 @@ def test_t2_is_the_mean_innovation_in_its_own_covariance():
     for at in range(9, 40):
         mean = fresh[at - 9 : at + 1].mean(axis=0)
         assert found[at] == pytest.approx(mean @ precision @ mean, rel=1e-3)
+
+
+def test_a_limit_leaves_what_is_usual_and_draws_in_what_stands_out():
+    run = usual("a")
+    limit = InnovationLimit.fit([run[:900], run[900:]])
+    distances = np.sqrt(squared_distance(run, fit_precision(run)))
+    assert limit.distance == pytest.approx(np.quantile(distances, 0.95))
+    far = distances > limit.distance
+    kept = limit.of(run)
+    np.testing.assert_array_equal(kept[~far], run[~far])
+    np.testing.assert_allclose(
+        np.sqrt(squared_distance(kept[far], limit.precision)), limit.distance
+    )
+    # Drawn in along its own direction.
+    np.testing.assert_allclose(
+        kept[far] / run[far], (limit.distance / distances[far])[:, None] @ np.ones((1, 3))
+    )
+    assert np.isnan(limit.of(np.full((2, STATES), np.nan))).all()
+    np.testing.assert_array_equal(limit.of(np.zeros((2, STATES))), 0.0)
+
+
+def test_one_start_rules_a_mean_no_longer_and_a_lasting_lean_still_does():
+    run, fresh = usual("a"), usual("fresh", 60)
+    free = MeanInnovation.fit([run], 10, None)
+    limited = MeanInnovation.fit([run], 10, InnovationLimit.fit([run]))
+    start, lean = fresh.copy(), fresh.copy()
+    start[30] += ROOT @ np.full(STATES, 20.0)
+    lean[30:] += ROOT @ np.full(STATES, 0.8)
+    during = slice(30, 40)
+    assert free.scale.of(free.statistic(start)[during]).min() > 2
+    assert limited.scale.of(limited.statistic(start)[during]).max() < 1.2
+    assert limited.scale.of(limited.statistic(lean)[45:]).min() > 1
 
 
 def given_the_others(values, moment, state):
@@ -93,7 +126,7 @@ def test_the_size_is_that_of_the_state_which_scatters_most_given_the_others():
 def test_both_statistics_are_what_they_should_be_on_average():
     """T2 and normalised innovations squared have the number of states as their mean."""
     run = usual("a", 20000)
-    assert MeanInnovation.fit([run], 10).statistic(run)[9:].mean() == pytest.approx(
+    assert MeanInnovation.fit([run], 10, None).statistic(run)[9:].mean() == pytest.approx(
         STATES, rel=1e-3
     )
     assert squared_distance(run, fit_precision(run)).mean() == pytest.approx(STATES, rel=1e-3)
@@ -101,10 +134,12 @@ def test_both_statistics_are_what_they_should_be_on_average():
 
 def test_no_mean_crosses_from_one_run_into_the_next():
     whole = usual("a", 400)
-    apart = MeanInnovation.fit([whole[:200], whole[200:]], 10)
+    apart = MeanInnovation.fit([whole[:200], whole[200:]], 10, None)
     means = np.concatenate([moving_mean(part, 10)[9:] for part in (whole[:200], whole[200:])])
     np.testing.assert_allclose(apart.precision, fit_precision(means))
-    assert not np.allclose(apart.precision, MeanInnovation.fit([whole], 10).precision, rtol=1e-6)
+    assert not np.allclose(
+        apart.precision, MeanInnovation.fit([whole], 10, None).precision, rtol=1e-6
+    )
 
 
 def test_the_covariance_is_about_zero_a_lasting_error_counts_as_spread():

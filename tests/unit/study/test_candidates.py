@@ -71,6 +71,14 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
         ("largest of mean, size, reconstruction; recent mean (.5, .5)", 4, [6.5, 7.5, 9.5]),
         ("largest of mean, size, reconstruction; larger recent (.7, .3)", 5, [5.7, 6.5, 9.3]),
         ("larger of mean and size of one state", 2, [4, 5, 2]),
+        (
+            (
+                "largest of limited mean over 20, size of one state over 3, reconstruction; "
+                "recent mean over 5 (.7, .3)"
+            ),
+            4,
+            [9.9, 6.4, 7.8],
+        ),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -79,6 +87,8 @@ def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
         SIZE: np.array([3.0, 1.0, 1.0]),
         REBUILT: np.array([2.0, 2.0, 9.0]),
         RECENT: np.full(3, 10.0),
+        "T2 of limited mean over 20": np.array([1.0, 7.0, 2.0]),
+        "T2 of mean over 5": np.full(3, 5.0),
         "size of one state over 3": np.array([12.0, 1.0, 1.0]),
         "size of one state over 10": np.array([4.0, 1.0, 1.0]),
     }
@@ -94,7 +104,7 @@ def test_no_two_candidates_have_a_name():
 
 def test_what_is_not_known_yet_leaves_the_whole_unknown():
     statistics = invented() | {RECENT: np.array([np.nan, 1.0, 1.0])}
-    whole = next(one for one in candidates() if one.parts == 4).of(statistics)
+    whole = next(one for one in candidates() if "recent mean (.7" in one.name).of(statistics)
     np.testing.assert_array_equal(np.isnan(whole), [True, False, False])
 
 
