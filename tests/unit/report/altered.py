@@ -7,7 +7,7 @@ import pandas as pd
 
 from odisar.report.load import Results
 
-from .invented import CLEAN, EVENT
+from .invented import CLEAN, DISTURBED, EVENT
 
 
 def add(results: Results, metric: str, detector: str, **columns: object) -> None:
@@ -33,6 +33,21 @@ def with_faults(results: Results, *names: str) -> None:
         )
         for _, row in copy.iterrows():
             known.loc[len(known)] = row
+
+
+def with_scenarios(results: Results) -> None:
+    """Let every result be judged by disturbance as well, and wind alone apart."""
+    known = results.examples.recordings
+    disturbed = known[known.recording == DISTURBED]
+    for column, value in (("disturbance", "case-1"), ("components", "wind")):
+        copies = disturbed.assign(recording=f"{DISTURBED}-{value}", **{column: value})
+        for _, row in copies.iterrows():
+            known.loc[len(known)] = row
+    for name in ("detection", "quadrants"):
+        table = getattr(results, name)
+        overall = table[table.evaluated_on == "overall"]
+        parts = [overall.assign(evaluated_on=value) for value in ("case-1", "case-3", "wind")]
+        setattr(results, name, pd.concat([table, *parts], ignore_index=True))
 
 
 def since_1970(results: Results) -> float:

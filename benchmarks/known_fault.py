@@ -1,0 +1,179 @@
+"""What a detector reaches that has been shown the very fault, beside one that knows no fault.
+
+Nobody has a true model of a real machine, so what could be reached at best is not known. This is
+the next best thing: for every fault (kind, channel, size) a logistic regression on the twin's
+innovations is trained on copies of calibration recordings that hold this fault alone, then judged
+on the test recordings by protocol P2 as the monitor is. It has been told what to look for, where,
+and how large it is; the monitor has not. The last column says how large the fault is against what
+the twin usually leaves of that channel in one sample, given all others. Run it from the project's
+root after `make real`:
+
+    .venv/bin/python benchmarks/known_fault.py
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sklearn.linear_model import LogisticRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from odisar.artifacts import Workspace, read_json
+from odisar.capability.innovation_values import InnovationScoreValues
+from odisar.capability.innovations import InnovationScore, moving_mean
+from odisar.capability.scoring import ODISAR, Scorer
+from odisar.config.loader import Config, load_config
+from odisar.evaluation.labels import label_active
+from odisar.evaluation.metrics import auroc, tnr_at_tpr95
+from odisar.recordings.faults import inject_faults
+from odisar.recordings.schema import Recording
+from odisar.stages.members import Member, MemberData, load_member, setup_members
+from odisar.twin.bundle import read_twin
+from odisar.twin.devices import use_one_thread
+from odisar.windows.coordinates import feature_positions
+from odisar.windows.scaling import channel_std
+
+Array = NDArray[np.float64]
+
+WORKSPACE, KINDS = Path("workspaces/real"), ("noise", "bias")
+#: Windows of the means that the regression is given, in samples.
+WINDOWS = (3, 5, 10, 20)
+#: Calibration recordings are copied with so many draws of each fault.
+SEEDS = range(4)
+
+#: Kind, channel and size of a fault.
+Fault = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A faulty recording as a twin saw it: (time, ...) what is known, and what is true."""
+
+    features: Array
+    score: Array
+    labels: NDArray[np.bool_]
+
+
+class Watcher:
+    """A member's twin, and what it knows of recordings with one fault."""
+
+    def __init__(self, config: Config, workspace: Workspace, member: Member) -> None:
+        self.data: MemberData = load_member(config, workspace, member)
+        limits = read_json(workspace.thresholds(member.setup))["members"][member.name]
+        fitted = InnovationScoreValues.model_validate(limits["innovation"]).build()
+        self._score: InnovationScore = fitted.twin
+        self._scorer = Scorer(read_twin(workspace.twin(member.name)), 256, "cpu", fitted)
+
+    def faulty(self) -> tuple[list[Recording], list[Recording]]:
+        """Return calibration recordings with faults, and the test recordings that have some."""
+        std = channel_std(self.data.splits["train"])
+        calibration, case = self.data.splits["calibration"], self.data.case
+        copies = [item for seed in SEEDS for item in inject_faults(calibration, case, std, seed)]
+        return copies, self.data.splits["test"]
+
+    def watch(self, recordings: Sequence[Recording]) -> Iterator[tuple[Fault, Seen]]:
+        """Yield each recording's fault and what is seen of it."""
+        for item in recordings:
+            fault = (
+                item.info.disturbance,
+                item.info.column("fault_channel"),
+                item.info.column("fault_size"),
+            )
+            if fault[0] in KINDS:
+                found = self._scorer.score(item, short_lead_steps=self.data.case.short_lead_steps)
+                column = self.column(fault[1])
+                parts = [
+                    informed(found.innovations[a:b], column, self._score) for a, b in found.runs
+                ]
+                # As in the pipeline's tables: from the first time a forecast error could be known.
+                known = slice(self.data.spec.horizon_steps, None)
+                labels = label_active(item.time_s[found.positions], item.intervals)
+                score = found.scores[ODISAR].astype(np.float64)
+                yield fault, Seen(np.concatenate(parts)[known], score[known], labels[known])
+
+    def column(self, channel: str) -> int:
+        """Return where a channel stands among the state features."""
+        spec, names = self.data.spec, list(self.data.case.channel_names)
+        (feature,) = feature_positions([names.index(channel)], len(names), spec.pose)
+        return spec.state_features(len(names)).index(feature)
+
+    def usual(self, channel: str) -> float:
+        """Return the spread of a channel's innovations given all others, in the channel's unit."""
+        spec, names = self.data.spec, list(self.data.case.channel_names)
+        (feature,) = feature_positions([names.index(channel)], len(names), spec.pose)
+        column = self.column(channel)
+        scaled = 1 / np.sqrt(self._score.size.precision[column, column])
+        return float(scaled * self.data.scaler.std[feature])
+
+
+def informed(innovations: Array, column: int, score: InnovationScore) -> Array:
+    """Return (time, feature) what the regression is given: means over several windows.
+
+    Of the guilty channel given all others (its size, and with its sign), of what leans its way,
+    and the monitor's own two statistics.
+    """
+    precision = score.size.precision
+    own = (innovations @ precision)[:, column] / np.sqrt(precision[column, column])
+    limit = score.mean.limit
+    drawn_in = innovations if limit is None else limit.of(innovations)
+    lean = (drawn_in @ precision)[:, column]
+    given = [
+        moving_mean(part, steps) for steps in WINDOWS for part in (np.log1p(own**2), own, lean)
+    ]
+    return np.column_stack([*given, *score.parts(innovations)])
+
+
+def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
+    """Return a row for each fault, over all members of a set-up."""
+    told: dict[Fault, list[Array]] = {}
+    untold: dict[Fault, list[Array]] = {}
+    truth: dict[Fault, list[Array]] = {}
+    for watcher in watchers:
+        copies, test = watcher.faulty()
+        shown: dict[Fault, list[Seen]] = {}
+        for fault, seen in watcher.watch(copies):
+            shown.setdefault(fault, []).append(seen)
+        models = {fault: trained(parts) for fault, parts in shown.items()}
+        for fault, seen in watcher.watch(test):
+            known = np.isfinite(seen.features).all(axis=1) & np.isfinite(seen.score)
+            told.setdefault(fault, []).append(models[fault].decision_function(seen.features[known]))
+            untold.setdefault(fault, []).append(seen.score[known])
+            truth.setdefault(fault, []).append(seen.labels[known])
+    rows = []
+    for fault in sorted(truth):
+        labels = np.concatenate(truth[fault]).astype(bool)
+        row: dict[str, object] = dict(zip(("kind", "channel", "size"), fault, strict=True))
+        for name, scores in (("ODiSAR", untold[fault]), ("shown the fault", told[fault])):
+            row[f"{name}, AUROC"] = auroc(np.concatenate(scores), labels)
+            row[f"{name}, TNR@TPR95"] = tnr_at_tpr95(np.concatenate(scores), labels)
+        spread = np.mean([watcher.usual(fault[1]) for watcher in watchers])
+        row["usual innovation"] = spread
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def trained(parts: Sequence[Seen]) -> LogisticRegression:
+    """Return a regression of what is true on what is known."""
+    features = np.concatenate([part.features for part in parts])
+    labels = np.concatenate([part.labels for part in parts])
+    known = np.isfinite(features).all(axis=1)
+    model = make_pipeline(StandardScaler(), LogisticRegression(max_iter=2000))
+    return model.fit(features[known], labels[known])
+
+
+def main() -> None:
+    """Print a table for each set-up of the real workspace."""
+    use_one_thread()
+    config, workspace = load_config(WORKSPACE), Workspace(WORKSPACE)
+    for setup in config.pipeline.setups:
+        watchers = [Watcher(config, workspace, member) for member in setup_members(config, setup)]
+        print(f"{setup}: usual innovations in the channel's unit")
+        print(judged(watchers).round(3).to_string(index=False), end="\n\n")
+
+
+if __name__ == "__main__":
+    main()
