@@ -22,7 +22,8 @@ from odisar.twin.transformer import TwinOutput
 from odisar.windows.targets import horizon_targets
 from odisar.windows.window_set import model_inputs, scaled_features
 
-#: The monitor's score: innovations of the twin. The same of its closed form alone. The paper's.
+#: The monitor's score: innovations of the twin and of its closed form. Of the closed form alone.
+#: The paper's.
 ODISAR, CLOSED_FORM, RECONSTRUCTION = "odisar", "closed-form", "reconstruction"
 #: The forecast-error baselines.
 RMSE, RMSE_SHORT = "rmse", "rmse-short-lead"
@@ -31,7 +32,11 @@ DETECTORS = (ODISAR, CLOSED_FORM, RECONSTRUCTION, RMSE, RMSE_SHORT)
 
 @dataclass(frozen=True)
 class InnovationScores:
-    """Fitted scores: the monitor's, and that of the closed form's innovations alone."""
+    """Fitted scores of the twin's innovations, and of those of the closed form it stands on.
+
+    The monitor's is their geometric mean. The two err for different reasons, the Transformer where
+    it has learnt too little or what it shouldn't, the closed form where things are not linear.
+    """
 
     twin: InnovationScore
     closed_form: InnovationScore
@@ -43,9 +48,12 @@ class InnovationScores:
 
         Innovations are (window, state feature), ``reconstruction`` errors (window,).
         """
+        twin = self.twin.score(innovations, reconstruction)
+        closed = self.closed_form.score(closed_form, reconstruction)
+        # Of roots: the product of two scores may be too large for a number.
         return {
-            ODISAR: self.twin.score(innovations, reconstruction).astype(np.float32),
-            CLOSED_FORM: self.closed_form.score(closed_form, reconstruction).astype(np.float32),
+            ODISAR: (np.sqrt(twin) * np.sqrt(closed)).astype(np.float32),
+            CLOSED_FORM: closed.astype(np.float32),
         }
 
 

@@ -16,9 +16,10 @@ from odisar.report.style import METRIC_NAMES
 #: What every twin does, whatever the case.
 _METHOD = (
     "A twin learns from undisturbed recordings to forecast the next sample and a horizon. The "
-    "score holds what it said about now against what is observed (the innovations), and how well "
-    "it reconstructs its own forecast; where that is rarer than on undisturbed recordings, the "
-    "machine is taken to be out of distribution. The paper's score is the reconstruction alone."
+    "score holds what it, and the closed form it stands on, said about now against what is "
+    "observed (the innovations), and how well it reconstructs its own forecast; where that is "
+    "rarer than on undisturbed recordings, the machine is taken to be out of distribution. The "
+    "paper's score is the reconstruction alone."
 )
 
 

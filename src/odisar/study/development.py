@@ -39,6 +39,9 @@ PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "study")
 _WINDOWS, _LEADS = (1, 3, 5, 10, 20), (5, 10)
 _WEIGHTS, _SIZES, _LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
 
+#: Before the name of a statistic of the closed form's innovations.
+_CLOSED = "closed form's "
+
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
 
@@ -60,22 +63,40 @@ def candidates() -> list[Candidate]:
     singles += [f"log NIS over {k}" for k in _SIZES] + ["log NIS over 5, by regime"]
     singles += [f"size of one state over {k}" for k in _SIZES]
     singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in _LEADS]
-    singles += [RECONSTRUCTION]
+    singles += [RECONSTRUCTION, *(f"{_CLOSED}{name}" for name in _of_limited())]
     made = [Candidate(name, 1, lambda s, n=name: s[n]) for name in singles]  # type: ignore[misc]
     for label, size in (("", "log NIS over 5"), (" of one state", "size of one state over 10")):
         made += _combined(label, "T2 of mean over 10", size)
-    return made + [_limited(steps, size) for steps in _LIMITED for size in _SIZES]
+    return made + [one for k in _LIMITED for size in _SIZES for one in _limited(k, size)]
 
 
-def _limited(steps: int, size: int) -> Candidate:
-    """Return one that takes the largest of three, of a mean that single innovations can't rule."""
-    three = (f"T2 of limited mean over {steps}", f"size of one state over {size}", RECONSTRUCTION)
+def _of_limited() -> list[str]:
+    """Return the statistics that candidates with a limited mean are made of."""
+    means = [f"T2 of limited mean over {k}" for k in _LIMITED]
+    return [*means, *(f"size of one state over {k}" for k in _SIZES), "T2 of mean over 5"]
+
+
+def _limited(steps: int, size: int) -> list[Candidate]:
+    """Return the largest of three, of a mean that single innovations can't rule.
+
+    Alone, and averaged with what the innovations of the closed form say.
+    """
+    two = (f"T2 of limited mean over {steps}", f"size of one state over {size}")
+    recent = "T2 of mean over 5"
     name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
-    return Candidate(
-        f"{name}; recent mean over 5 (.7, .3)",
-        4,
-        lambda s: 0.7 * _largest(s, three) + 0.3 * _largest(s, ("T2 of mean over 5",)),
-    )
+    name += "; recent mean over 5 (.7, .3)"
+
+    def alone(s: Statistics) -> FloatArray:
+        return 0.7 * _largest(s, (*two, RECONSTRUCTION)) + 0.3 * s[recent]
+
+    def closed(s: Statistics) -> FloatArray:
+        lasting = _largest(s, tuple(f"{_CLOSED}{name}" for name in two))
+        return 0.7 * lasting + 0.3 * s[f"{_CLOSED}{recent}"]
+
+    return [
+        Candidate(name, 4, alone),
+        Candidate(f"{name}; mean with closed form", 7, lambda s: (alone(s) + closed(s)) / 2),
+    ]
 
 
 def _combined(label: str, mean: str, size: str) -> list[Candidate]:
@@ -184,15 +205,15 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
     for steps in _WINDOWS:
         mean = MeanInnovation.fit(runs, steps, None)
         raw[f"T2 of mean over {steps}"] = _along(mean.statistic)
-    limit = InnovationLimit.fit(runs)
-    for steps in _LIMITED:
-        mean = MeanInnovation.fit(runs, steps, limit)
-        raw[f"T2 of limited mean over {steps}"] = _along(mean.statistic)
     for weight in _WEIGHTS:
         raw[f"T2 of exponential mean, weight {weight:g}"] = _along(_exponential(runs, weight))
     for steps in _SIZES:
         raw[f"log NIS over {steps}"] = _along(log_sizes(runs, steps))
-        raw[f"size of one state over {steps}"] = _along(InnovationSize.fit(runs, steps).statistic)
+    for name, statistic in _limited_statistics(runs).items():
+        raw[name] = _along(statistic)
+    closed = [s.closed_form_innovations[a + 1 : b] for _, s in held_out for a, b in s.runs]
+    for name, statistic in _limited_statistics(closed).items():
+        raw[f"{_CLOSED}{name}"] = _along(statistic, of_closed_form=True)
     by_regime = regime_distance(data, held_out)
     raw["log NIS over 5, by regime"] = lambda item, s: moving_mean(np.log1p(by_regime(item, s)), 5)
     for lead in _LEADS:
@@ -203,15 +224,26 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
     return {name: _scaled(make, held_out) for name, make in raw.items()}
 
 
+def _limited_statistics(
+    runs: list[FloatArray],
+) -> dict[str, Callable[[FloatArray], FloatArray]]:
+    """Return what ``_of_limited`` names, fitted on runs of innovations."""
+    limit = InnovationLimit.fit(runs)
+    fitted = [MeanInnovation.fit(runs, k, limit).statistic for k in _LIMITED]
+    fitted += [InnovationSize.fit(runs, k).statistic for k in _SIZES]
+    fitted += [MeanInnovation.fit(runs, 5, None).statistic]
+    return dict(zip(_of_limited(), fitted, strict=True))
+
+
 def _exponential(runs: list[FloatArray], weight: float) -> Callable[[FloatArray], FloatArray]:
     precision = fit_precision(np.concatenate([exponential_mean(run, weight) for run in runs]))
     return lambda innovations: squared_distance(exponential_mean(innovations, weight), precision)
 
 
-def _along(statistic: Callable[[FloatArray], FloatArray]) -> Maker:
+def _along(statistic: Callable[[FloatArray], FloatArray], *, of_closed_form: bool = False) -> Maker:
     def make(_: Recording, scores: RecordingScores) -> FloatArray:
-        parts = [statistic(scores.innovations[a:b]) for a, b in scores.runs]
-        return np.concatenate(parts)
+        found = scores.closed_form_innovations if of_closed_form else scores.innovations
+        return np.concatenate([statistic(found[a:b]) for a, b in scores.runs])
 
     return make
 

@@ -99,3 +99,13 @@ def test_a_part_that_is_missing_is_named(content, key):
     del content["closed_form"][key]
     with pytest.raises(ValidationError, match=f"closed_form.{key}"):
         InnovationScoreValues.model_validate(content)
+
+
+def test_the_monitors_score_is_the_geometric_mean_of_the_twins_and_the_closed_forms():
+    scores, random = fitted(), generator(5, "both")
+    innovations, rebuilt = random.normal(size=(2, 50, 2)), np.exp(random.normal(size=50))
+    found = scores.of(*innovations, rebuilt)
+    twin = scores.twin.score(innovations[0], rebuilt)
+    np.testing.assert_allclose(found["odisar"] ** 2, twin * found["closed-form"], rtol=1e-5)
+    huge = np.full((50, 2), 1e30)
+    assert np.isfinite(scores.of(huge, huge, rebuilt)["odisar"][6:]).all()
