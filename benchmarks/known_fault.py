@@ -4,9 +4,9 @@ Nobody has a true model of a real machine, so what could be reached at best is n
 the next best thing: for every fault (kind, channel, size) a logistic regression on the twin's
 innovations is trained on copies of calibration recordings that hold this fault alone, then judged
 on the test recordings by protocol P2 as the monitor is. It has been told what to look for, where,
-and how large it is; the monitor has not. The last column is what the twin usually
-leaves of that channel in one sample, given all others, in the channel's unit. Run it from the project's
-root after `make real`:
+and how large it is; the monitor has not. The last column is what the twin usually leaves of that
+channel in one sample, given all others, in the channel's unit. Run it from the project's root after
+`make real`:
 
     .venv/bin/python benchmarks/known_fault.py
 """
