@@ -189,7 +189,7 @@ def main() -> None:
     for setup in config.pipeline.setups:
         watchers = [Watcher(config, workspace, member) for member in setup_members(config, setup)]
         print(setup)
-        print(judged(watchers).round(3).to_string(index=False), end="\n\n")
+        print(judged(watchers).round(4).to_string(index=False), end="\n\n")
 
 
 if __name__ == "__main__":
