@@ -4,9 +4,9 @@ Nobody has a true model of a real machine, so what could be reached at best is n
 the next best thing: for every fault (kind, channel, size) a logistic regression on the twin's
 innovations is trained on copies of calibration recordings that hold this fault alone, then judged
 on the test recordings by protocol P2 as the monitor is. It has been told what to look for, where,
-and how large it is; the monitor has not. The last column says how large the fault is against what
-the twin usually leaves of that channel in one sample, given all others. Run it from the project's
-root after `make real`:
+and how large it is; the monitor has not. The last column is what the twin usually leaves of that
+channel in one sample, given all others, in the channel's unit. Run it from the project's root after
+`make real`:
 
     .venv/bin/python benchmarks/known_fault.py
 """
@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
-from sklearn.pipeline import make_pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from odisar.artifacts import Workspace, read_json
@@ -66,6 +66,7 @@ class Watcher:
         limits = read_json(workspace.thresholds(member.setup))["members"][member.name]
         fitted = InnovationScoreValues.model_validate(limits["innovation"]).build()
         self._score: InnovationScore = fitted.twin
+        self._threshold: float = limits["sigma"][ODISAR]
         self._scorer = Scorer(read_twin(workspace.twin(member.name)), 256, "cpu", fitted)
 
     def faulty(self) -> tuple[list[Recording], list[Recording]]:
@@ -76,24 +77,25 @@ class Watcher:
         return copies, self.data.splits["test"]
 
     def watch(self, recordings: Sequence[Recording]) -> Iterator[tuple[Fault, Seen]]:
-        """Yield each recording's fault and what is seen of it."""
+        """Yield each recording's fault and what is seen of it, from run to run.
+
+        As in the pipeline's tables a run counts from the first time a forecast error could be
+        known, and scores are in multiples of the twin's own threshold.
+        """
         for item in recordings:
-            fault = (
-                item.info.disturbance,
-                item.info.column("fault_channel"),
-                item.info.column("fault_size"),
-            )
+            info = item.info
+            fault = info.disturbance, info.column("fault_channel"), info.column("fault_size")
             if fault[0] in KINDS:
                 found = self._scorer.score(item, short_lead_steps=self.data.case.short_lead_steps)
-                column = self.column(fault[1])
-                parts = [
-                    informed(found.innovations[a:b], column, self._score) for a, b in found.runs
-                ]
-                # As in the pipeline's tables: from the first time a forecast error could be known.
-                known = slice(self.data.spec.horizon_steps, None)
                 labels = label_active(item.time_s[found.positions], item.intervals)
-                score = found.scores[ODISAR].astype(np.float64)
-                yield fault, Seen(np.concatenate(parts)[known], score[known], labels[known])
+                score = found.scores[ODISAR].astype(np.float64) / self._threshold
+                for start, stop in found.runs:
+                    features = informed(
+                        found.innovations[start:stop], self.column(fault[1]), self._score
+                    )
+                    known = slice(self.data.spec.horizon_steps, None)
+                    run = slice(start + self.data.spec.horizon_steps, stop)
+                    yield fault, Seen(features[known], score[run], labels[run])
 
     def column(self, channel: str) -> int:
         """Return where a channel stands among the state features."""
@@ -131,38 +133,53 @@ def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
     """Return a row for each fault, over all members of a set-up."""
     told: dict[Fault, list[Array]] = {}
     untold: dict[Fault, list[Array]] = {}
-    truth: dict[Fault, list[Array]] = {}
+    truth: dict[Fault, list[NDArray[np.bool_]]] = {}
     for watcher in watchers:
         copies, test = watcher.faulty()
         shown: dict[Fault, list[Seen]] = {}
         for fault, seen in watcher.watch(copies):
             shown.setdefault(fault, []).append(seen)
-        models = {fault: trained(parts) for fault, parts in shown.items()}
+        models = {fault: Told.by(parts) for fault, parts in shown.items()}
         for fault, seen in watcher.watch(test):
             known = np.isfinite(seen.features).all(axis=1) & np.isfinite(seen.score)
-            told.setdefault(fault, []).append(models[fault].decision_function(seen.features[known]))
+            told.setdefault(fault, []).append(models[fault].score(seen.features[known]))
             untold.setdefault(fault, []).append(seen.score[known])
             truth.setdefault(fault, []).append(seen.labels[known])
     rows = []
     for fault in sorted(truth):
-        labels = np.concatenate(truth[fault]).astype(bool)
+        labels = np.concatenate(truth[fault])
         row: dict[str, object] = dict(zip(("kind", "channel", "size"), fault, strict=True))
         for name, scores in (("ODiSAR", untold[fault]), ("shown the fault", told[fault])):
             row[f"{name}, AUROC"] = auroc(np.concatenate(scores), labels)
             row[f"{name}, TNR@TPR95"] = tnr_at_tpr95(np.concatenate(scores), labels)
-        spread = np.mean([watcher.usual(fault[1]) for watcher in watchers])
-        row["usual innovation"] = spread
+        row["usual innovation"] = np.mean([watcher.usual(fault[1]) for watcher in watchers])
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def trained(parts: Sequence[Seen]) -> LogisticRegression:
-    """Return a regression of what is true on what is known."""
-    features = np.concatenate([part.features for part in parts])
-    labels = np.concatenate([part.labels for part in parts])
-    known = np.isfinite(features).all(axis=1)
-    model = make_pipeline(StandardScaler(), LogisticRegression(max_iter=2000))
-    return model.fit(features[known], labels[known])
+@dataclass(frozen=True)
+class Told:
+    """A regression of what is true on what is known; folds are put on one scale."""
+
+    model: Pipeline
+    usual: float
+    spread: float
+
+    @classmethod
+    def by(cls, parts: Sequence[Seen]) -> "Told":
+        """Train on faulty calibration recordings; their healthy part says what is usual."""
+        features = np.concatenate([part.features for part in parts])
+        labels = np.concatenate([part.labels for part in parts])
+        known = np.isfinite(features).all(axis=1)
+        features, labels = features[known], labels[known]
+        model = make_pipeline(StandardScaler(), LogisticRegression(max_iter=2000))
+        model.fit(features, labels)
+        healthy = model.decision_function(features[~labels])
+        return cls(model, float(healthy.mean()), float(healthy.std()))
+
+    def score(self, features: Array) -> Array:
+        """Return (time,) how sure it is of the fault, in standard deviations of the healthy."""
+        return np.asarray((self.model.decision_function(features) - self.usual) / self.spread)
 
 
 def main() -> None:
@@ -171,8 +188,8 @@ def main() -> None:
     config, workspace = load_config(WORKSPACE), Workspace(WORKSPACE)
     for setup in config.pipeline.setups:
         watchers = [Watcher(config, workspace, member) for member in setup_members(config, setup)]
-        print(f"{setup}: usual innovations in the channel's unit")
-        print(judged(watchers).round(3).to_string(index=False), end="\n\n")
+        print(setup)
+        print(judged(watchers).round(4).to_string(index=False), end="\n\n")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def network(patch_steps: int) -> TwinTransformer:
         reconstruction_dim=128,
         dropout=0.1,
         detach_reconstruction=False,
-        closed_form_lags=10,
+        closed_form_lags=5,
         residual_forecast=False,
     )
     return TwinTransformer(config, SPEC, CHANNELS)

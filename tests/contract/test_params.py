@@ -53,6 +53,11 @@ def test_every_profile_is_valid(raw, profile):
         (("training", "epoch"), 5, "training.epoch: Extra inputs"),
         (("twin", "heads"), 5, "must be a multiple of twin.heads=5"),
         (("twin", "patch_steps"), 7, "must be a multiple of twin.patch_steps=7"),
+        (
+            ("twin", "closed_form_lags"),
+            21,
+            "context_steps=20 is shorter than twin.closed_form_lags",
+        ),
         (("pipeline", "setups"), ["nothing"], "'nothing' is not declared under setups"),
         (("setups", "vessel-all", "case"), "boat", "'boat' is not declared under cases"),
         (("cases", "vessel", "channels"), [], "cases.vessel.channels"),

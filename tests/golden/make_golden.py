@@ -19,7 +19,13 @@ import pandas as pd
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, assessments_json
-from odisar.capability.innovations import InnovationScore, InnovationSize, LogScale, MeanInnovation
+from odisar.capability.innovations import (
+    InnovationLimit,
+    InnovationScore,
+    InnovationSize,
+    LogScale,
+    MeanInnovation,
+)
 from odisar.capability.scoring import (
     CLOSED_FORM,
     ODISAR,
@@ -140,7 +146,8 @@ def twin() -> dict[str, Any]:
 
 def analytic_scores() -> InnovationScores:
     """Return innovation scores that were fitted on nothing."""
-    mean = MeanInnovation(4, np.array([[2.0, 0.3], [0.3, 1.0]]), LogScale(-0.5, 1.5), None)
+    limit = InnovationLimit(np.array([[1.2, 0.1], [0.1, 0.9]]), 0.7)
+    mean = MeanInnovation(4, np.array([[2.0, 0.3], [0.3, 1.0]]), LogScale(-0.5, 1.5), limit)
     size = InnovationSize(2, np.array([[1.5, -0.2], [-0.2, 0.8]]), LogScale(-0.7, 0.9))
     recent = MeanInnovation(2, np.array([[0.9, 0.1], [0.1, 0.7]]), LogScale(-0.8, 1.9), None)
     return InnovationScores(

@@ -153,7 +153,8 @@ def blame_windows(
 ) -> FloatArray:
     """Return (window, state) how much each state explains of what is seen at these windows.
 
-    States are those of ``blamed_names``; see ``Signatures.blame``.
+    States are those of ``blamed_names``; see ``Signatures.blame``. Of the twin's innovations alone:
+    those of the closed form, which count in the score as well, are of the same states.
     """
     assert scorer.innovation_scores is not None  # noqa: S101 (who asks has checked)
     signatures = Signatures.of(scorer.twin, scorer.innovation_scores.twin)

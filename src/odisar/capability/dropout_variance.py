@@ -12,7 +12,7 @@ from odisar.twin.mc_dropout import draw_forecasts
 _FORECASTS_PER_HORIZON = 4
 #: Windows whose draws are made at once; a matter of memory, not of results.
 _BATCH = 64
-#: Added to what is usual, so that a state whose draws agree doesn't divide by zero.
+#: What is usual is at least this: draws that agree on a state must not divide by zero.
 _SMALLEST = 1.0e-12
 
 

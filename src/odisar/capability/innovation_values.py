@@ -58,9 +58,9 @@ class StatisticValues(_Covariant):
 
 
 class MeanValues(StatisticValues):
-    """T2 of a mean; bundles of before there was a limit have none."""
+    """T2 of a mean, of innovations that are cut back to a limit or not."""
 
-    limit: LimitValues | None = None
+    limit: LimitValues | None
 
 
 class InnovationValues(Section):

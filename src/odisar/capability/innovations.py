@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 _SHRINKAGE = 1.0e-6
 #: What is usual and what is rare on held-out recordings: 0 and 1 on the common scale.
 _USUAL, _RARE = 0.5, 0.99
-#: Single innovations that fewer held-out ones than this exceed are cut back.
+#: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
 #: Below it a statistic is called zero; its log must stay finite.
 _SMALLEST = 1.0e-12
@@ -98,8 +98,9 @@ class InnovationLimit:
     """How far from zero, by Mahalanobis distance, a single innovation may count.
 
     Huber's psi for vectors (Maronna, Annals of Statistics 1976): what lies further out keeps its
-    direction and is drawn in to the limit. A lasting change shows in every sample and hardly loses
-    by it; one start or stop no longer rules a mean for as long as it is in the window.
+    direction and is drawn in to the limit. One start or stop no longer rules a mean for as long as
+    it is in the window; a lasting change shows in every sample and is seen as soon, though a large
+    one no longer counts for more than a moderate one.
     """
 
     precision: FloatArray
@@ -199,13 +200,14 @@ class InnovationSteps:
 
 @dataclass(frozen=True)
 class InnovationScore:
-    """The monitor's score, as exp of a weighted sum of statistics on their common log scale.
+    """A score of innovations, as exp of a weighted sum of statistics on their common log scale.
 
     The largest of T2 of the mean innovation, the size of the innovations of the state that scatters
     most and, where there is one, the reconstruction error of the forecast (``reconstruction`` is
     its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
     mean of very few innovations, which lets go as soon as a disturbance has ended. 1 is what is
-    usual on held-out recordings, e = 2.7 what is rare.
+    usual on held-out recordings, e = 2.7 what is rare. The monitor's is made of two of these (see
+    ``scoring.InnovationScores``).
     """
 
     mean: MeanInnovation

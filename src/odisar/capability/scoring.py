@@ -50,7 +50,6 @@ class InnovationScores:
         """
         twin = self.twin.score(innovations, reconstruction)
         closed = self.closed_form.score(closed_form, reconstruction)
-        # Of roots: the product of two scores may be too large for a number.
         return {
             ODISAR: (np.sqrt(twin) * np.sqrt(closed)).astype(np.float32),
             CLOSED_FORM: closed.astype(np.float32),

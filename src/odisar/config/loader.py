@@ -121,6 +121,12 @@ class Config(Section):
                         f"cases.{name}.window.{field}={steps} must be a multiple of "
                         f"twin.patch_steps={self.twin.patch_steps}"
                     )
+            if case.window.context_steps < self.twin.closed_form_lags:
+                raise ValueError(
+                    f"cases.{name}.window.context_steps={case.window.context_steps} is shorter "
+                    f"than twin.closed_form_lags={self.twin.closed_form_lags}: lengthen it, or "
+                    "let the closed form look back less"
+                )
         return self
 
     def case_of(self, setup: str) -> Case:

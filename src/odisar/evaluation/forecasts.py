@@ -27,20 +27,13 @@ Forecast = Callable[[torch.Tensor, torch.Tensor], ArrayLike]
 #: The forecaster that skill is counted from; the row over all states, and that over all steps.
 PERSISTENCE, ALL_STATES, ALL_STEPS = "persistence", "all", 0
 
-FORECAST_COLUMNS = (
-    "setup",
-    "forecaster",
-    "commands",
-    "state",
-    "step",
-    "rmse",
-    "ci_low",
-    "ci_high",
-    "rmse_physical",
-    "skill",
-    "recordings",
-    "windows",
-)
+#: Columns of the table and their types, which a table without a row has as well.
+FORECAST_COLUMNS = {
+    **dict.fromkeys(("setup", "forecaster", "commands", "state"), "str"),
+    "step": "int64",
+    **dict.fromkeys(("rmse", "ci_low", "ci_high", "rmse_physical", "skill"), "float64"),
+    **dict.fromkeys(("recordings", "windows"), "int64"),
+}
 #: Windows that are judged start every quarter of a horizon; a table has so many of its steps.
 _STARTS_PER_HORIZON, _STEPS_SHOWN = 4, 12
 #: Windows forecast at a time; a matter of memory, not of results.
@@ -165,7 +158,16 @@ def forecast_table(
                     "windows": int(windows),
                 }
             )
-    return pd.DataFrame(rows, columns=list(FORECAST_COLUMNS))
+    return _typed(rows)
+
+
+def no_forecasts() -> pd.DataFrame:
+    """Return the table of a set-up of which nothing could be judged."""
+    return _typed([])
+
+
+def _typed(rows: list[Row]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=list(FORECAST_COLUMNS)).astype(FORECAST_COLUMNS)
 
 
 @dataclass(frozen=True)

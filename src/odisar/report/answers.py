@@ -131,7 +131,9 @@ def forecasts(results: Results, setup: str) -> Table:
             forecaster_name(row.forecaster),
             "known" if row.commands == "known-ahead" else "unknown",
             "all (scaled)" if row.state == ALL_STATES else row.state,
-            f"{number(row.rmse)} [{number(row.ci_low)}, {number(row.ci_high)}]",
+            number(row.rmse)
+            if pd.isna(row.ci_low)
+            else f"{number(row.rmse)} [{number(row.ci_low)}, {number(row.ci_high)}]",
             number(row.rmse_physical),
             number(row.skill),
         ]

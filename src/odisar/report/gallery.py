@@ -258,7 +258,8 @@ PLATES = (
         "forecast-error-study",
         "Forecast error by step (from the study)",
         "learning",
-        "The same of more forecasters, each trained on equally many windows, fewer than the twin.",
+        "The same of more forecasters; networks see equally many windows, fewer than the twin did. "
+        "The commands of the horizon are unknown, unless all know them.",
         studied_error_by_step,
         applies=has_studied_forecasts,
     ),

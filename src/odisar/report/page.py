@@ -13,6 +13,7 @@ from pygments.formatters import HtmlFormatter  # type: ignore[import-untyped]
 from odisar.report import answers, overview, tables
 from odisar.report.exhibits import Drawn
 from odisar.report.figures.blame import has_blame
+from odisar.report.figures.forecasting import has_forecasts
 from odisar.report.load import Results
 from odisar.report.notebooks import notebook_html, notebook_title
 from odisar.report.study import missing_study, study_tables
@@ -63,7 +64,11 @@ def render_body(
             quality=overview.quality(results),
             learning=[
                 overview.training(results),
-                *(answers.forecasts(results, setup) for setup in results.setups),
+                *(
+                    answers.forecasts(results, setup)
+                    for setup in results.setups
+                    if has_forecasts(results, setup)
+                ),
                 overview.thresholds(results),
                 *(tables.parameters(results, setup) for setup in results.setups),
             ],

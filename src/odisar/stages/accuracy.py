@@ -7,11 +7,11 @@ import pandas as pd
 from odisar.capability.scoring import Scorer
 from odisar.config.judging import EvaluationConfig
 from odisar.evaluation.forecasts import (
-    FORECAST_COLUMNS,
     Forecast,
     ForecastErrors,
     forecast_errors,
     forecast_table,
+    no_forecasts,
 )
 from odisar.forecasters.registry import cheap_forecasters
 from odisar.stages.members import MemberData
@@ -52,15 +52,11 @@ def accuracy_table(
     by_commands: dict[str, list[ForecastErrors]] = {}
     for errors in (one for part in parts for one in part):
         by_commands.setdefault(errors.commands, []).append(errors)
-    tables = (
-        [pd.DataFrame(columns=list(FORECAST_COLUMNS))]
-        if not by_commands
-        else [
-            forecast_table(setup, ForecastErrors.joined(found), states, cfg, base_seed)
-            for found in by_commands.values()
-        ]
-    )
-    return pd.concat(tables)
+    tables = [
+        forecast_table(setup, ForecastErrors.joined(found), states, cfg, base_seed)
+        for found in by_commands.values()
+    ]
+    return pd.concat([no_forecasts(), *tables])
 
 
 def _fitted(data: MemberData) -> dict[str, Forecast]:

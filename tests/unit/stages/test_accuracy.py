@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pandas as pd
 import torch
 
 from odisar.stages.accuracy import TWIN, accuracy_table, member_accuracy
@@ -72,4 +74,14 @@ def test_members_of_a_set_up_are_pooled_and_one_without_recordings_says_nothing(
     assert set(table.commands) == {"unknown", "known-ahead"}
     whole = table[(table.state == "all") & (table.step == 0)].set_index(["commands", "forecaster"])
     assert whole.skill["known-ahead", "closed-form"] > whole.skill["unknown", "closed-form"] > 0
-    assert accuracy_table("system", [[]], STATES, CONFIG, 1).empty
+    nothing = accuracy_table("system", [[]], STATES, CONFIG, 1)
+    assert nothing.empty
+    # Below another set-up's, numbers stay numbers.
+    assert (pd.concat([nothing, table]).dtypes == table.dtypes).all()
+    assert table.rmse.dtype == np.float64
+
+
+def test_a_short_context_is_looked_at_whole():
+    spec = replace(SPEC, context_steps=5)
+    found, _ = judged(member(spec))
+    assert found["unknown"] == CHEAP | {TWIN}

@@ -79,6 +79,15 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
             4,
             [9.9, 6.4, 7.8],
         ),
+        (
+            (
+                "largest of limited mean over 20, size of one state over 3, reconstruction; "
+                "recent mean over 5 (.7, .3); mean with closed form"
+            ),
+            7,
+            # (9.9 + .7 * 6 + .3 * 4) / 2 and so on.
+            [7.65, 7.6, 8.3],
+        ),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -89,6 +98,9 @@ def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
         RECENT: np.full(3, 10.0),
         "T2 of limited mean over 20": np.array([1.0, 7.0, 2.0]),
         "T2 of mean over 5": np.full(3, 5.0),
+        "closed form's T2 of limited mean over 20": np.array([6.0, 1.0, 2.0]),
+        "closed form's size of one state over 3": np.array([3.0, 8.0, 8.0]),
+        "closed form's T2 of mean over 5": np.array([4.0, 32 / 3, 32 / 3]),
         "size of one state over 3": np.array([12.0, 1.0, 1.0]),
         "size of one state over 10": np.array([4.0, 1.0, 1.0]),
     }
@@ -127,3 +139,25 @@ def test_every_statistic_is_made_and_none_knows_what_comes_later(relative_twin):
         # 21 samples before the first forecast of a sample, and at most 20 that are averaged.
         assert known[41:].all(), name
         np.testing.assert_allclose(long[: len(short)], short, atol=1e-3, err_msg=name)
+
+
+def test_statistics_of_the_closed_form_are_of_its_innovations(trained_twin):
+    data = MemberData(small_case(), {"train": []}, trained_twin.scaler, trained_twin.spec)
+    scorer = Scorer(trained_twin, 64, "cpu")
+    held_out = [
+        (item, scorer.score(item, short_lead_steps=3))
+        for item in (make_recording(f"held-out-{i}", 200) for i in range(2))
+    ]
+    makers = fit_statistics(data, scorer, held_out)
+    item, scores = held_out[0]
+    swapped = replace(
+        scores,
+        innovations=scores.closed_form_innovations,
+        closed_form_innovations=scores.innovations,
+    )
+    for name in ("T2 of limited mean over 20", "size of one state over 3", "T2 of mean over 5"):
+        own, closed = makers[name], makers[f"closed form's {name}"]
+        moved = closed(item, replace(scores, innovations=scores.innovations + 1))
+        np.testing.assert_array_equal(closed(item, scores), moved)
+        assert not np.allclose(own(item, scores), closed(item, scores), equal_nan=True)
+        assert not np.allclose(closed(item, scores), closed(item, swapped), equal_nan=True)
