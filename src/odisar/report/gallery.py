@@ -197,7 +197,7 @@ PLATES = (
         "alternatives",
         "Probes for leakage: what may not move the score at t was changed, and what must move it. "
         "Told is in how many tries the score moved, and the largest move in interquartile ranges "
-        "(IQR) of the score.",
+        "(IQR) of the score. The study's may take a horizon: some score every few samples only.",
         leakage_panel,
     ),
     Plate(

@@ -38,14 +38,23 @@ def member_leakage(data: MemberData, detectors: MemberDetectors, seed: int) -> p
     _, first = detectors.score(recordings[0])
     remembered = _Remembered(detectors)
     return leakage_table(
-        [probe(data, name, remembered.score_of(name), recordings, seed) for name in first]
+        [
+            probe(data, name, remembered.score_of(name), recordings, seed, control_delay_steps=0)
+            for name in first
+        ]
     )
 
 
 def probe(
-    data: MemberData, name: str, score: Score, recordings: Sequence[Recording], seed: int
+    data: MemberData,
+    name: str,
+    score: Score,
+    recordings: Sequence[Recording],
+    seed: int,
+    *,
+    control_delay_steps: int,
 ) -> LeakageReport:
-    """Return the report on one score of a case's recordings."""
+    """Return the report on one score of a case's recordings (see ``ProbePlan``)."""
     states = [i for i, c in enumerate(data.case.channels) if c.role == "state"]
     return probe_leakage(
         name,
@@ -54,6 +63,7 @@ def probe(
         std=channel_std(data.splits["train"]),
         seed=derive_seed(seed, "leakage"),
         states=states,
+        control_delay_steps=control_delay_steps,
         tolerated_share=_TOLERATED_SHARE,
     )
 

@@ -42,7 +42,17 @@ def run(config: ConfigView, workspace: Workspace) -> None:
     for name in sorted(short, key=NOT_DEPLOYABLE.__contains__):
         detector = (full if name in NOT_DEPLOYABLE else short)[name]()
         detector.fit(reference)
-        reports.append(probe(data, name, detector.score, probed_recordings(data), config.seed))
+        reports.append(
+            probe(
+                data,
+                name,
+                detector.score,
+                probed_recordings(data),
+                config.seed,
+                # Some score every few samples only and hold what they said.
+                control_delay_steps=data.spec.horizon_steps,
+            )
+        )
     table = leakage_table(reports).assign(setup=setup, member=setup)
     write_table(workspace.study_results / "leakage.csv", pd.DataFrame(table))
 
