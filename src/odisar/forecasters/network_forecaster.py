@@ -1,5 +1,6 @@
 """What all forecasters that are networks have in common: how they are fitted and asked."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import torch
@@ -19,7 +20,7 @@ Objective = Callable[[nn.Module, Batch], torch.Tensor]
 _HELD_OUT_BATCH = 1024
 
 
-class NetworkForecaster:
+class NetworkForecaster(ABC):
     """A forecaster that is fitted by ``fitting.fit_network``; kinds of it say which network."""
 
     def __init__(self, budget: FitBudget, seed: int) -> None:
@@ -27,9 +28,9 @@ class NetworkForecaster:
         self._network: nn.Module | None = None
         self._record: FitRecord | None = None
 
+    @abstractmethod
     def build(self, shape: WindowShape) -> nn.Module:
         """Return a fresh network; its random numbers are torch's, which ``fit`` has seeded."""
-        raise NotImplementedError
 
     def objective(self, shape: WindowShape) -> Objective:  # noqa: ARG002
         """Return what is minimised: the squared error, unless a kind of network says otherwise."""
