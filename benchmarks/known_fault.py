@@ -2,11 +2,11 @@
 
 Nobody has a true model of a real machine, so what could be reached at best is not known. This is
 the next best thing: for every fault (kind, channel, size) a logistic regression on the twin's
-innovations is trained on copies of calibration recordings that hold this fault alone, then judged
-on the test recordings by protocol P2 as the monitor is. It has been told what to look for, where,
-and how large it is; the monitor has not. The last column is what the twin usually leaves of that
-channel in one sample, given all others, in the channel's unit. Run it from the project's root after
-`make real`:
+innovations and on parity residuals is trained on copies of calibration recordings that hold this
+fault alone, then judged on the test recordings by protocol P2 as the monitor is. It has been told
+what to look for, where, and how large it is; the monitor has not. The last column is what the twin
+usually leaves of that channel in one sample, given all others, in the channel's unit. Run it from
+the project's root after `make real`:
 
     .venv/bin/python benchmarks/known_fault.py
 """
@@ -65,6 +65,7 @@ class Watcher:
         self.data: MemberData = load_member(config, workspace, member)
         limits = read_json(workspace.thresholds(member.setup))["members"][member.name]
         fitted = InnovationScoreValues.model_validate(limits["innovation"]).build()
+        self._fitted = fitted
         self._score: InnovationScore = fitted.twin
         self._threshold: float = limits["sigma"][ODISAR]
         self._scorer = Scorer(read_twin(workspace.twin(member.name)), 256, "cpu", fitted)
@@ -90,8 +91,14 @@ class Watcher:
                 labels = label_active(item.time_s[found.positions], item.intervals)
                 score = found.scores[ODISAR].astype(np.float64) / self._threshold
                 for start, stop in found.runs:
-                    features = informed(
-                        found.innovations[start:stop], self.column(fault[1]), self._score
+                    seen = found.innovations[start:stop]
+                    tied = self._fitted.relations.residuals(found.samples[start:stop])
+                    column = self.column(fault[1])
+                    features = np.hstack(
+                        [
+                            informed(seen, column, self._score),
+                            informed(tied, column, self._fitted.consistency),
+                        ]
                     )
                     known = slice(self.data.spec.horizon_steps, None)
                     run = slice(start + self.data.spec.horizon_steps, stop)
@@ -113,10 +120,10 @@ class Watcher:
 
 
 def informed(innovations: Array, column: int, score: InnovationScore) -> Array:
-    """Return (time, feature) what the regression is given: means over several windows.
+    """Return (time, feature) what the regression is given of innovations or parity residuals.
 
-    Of the guilty channel given all others (its size, and with its sign), of what leans its way,
-    and the monitor's own two statistics.
+    Means over several windows of the guilty channel given all others (its size, and with its
+    sign) and of what leans its way, and the monitor's own two statistics.
     """
     precision = score.size.precision
     own = (innovations @ precision)[:, column] / np.sqrt(precision[column, column])

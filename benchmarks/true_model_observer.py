@@ -143,7 +143,7 @@ def main() -> None:
     observer, names = Observer(config.simulators.vessel), data.case.channel_names
     held_out = Fleet.of(data.splits["validation"], names)
     noise = fit_process_noise(observer, held_out)
-    chosen = config.capability.innovation
+    chosen = config.cases["vessel"].score.innovation
     steps = InnovationSteps(
         chosen.mean_steps, chosen.size_steps, chosen.recent_steps, chosen.recent_share
     )

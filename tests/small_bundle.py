@@ -59,6 +59,10 @@ def small_case(**changes: object) -> Case:
             "block_s": None,
             "block_gap_s": None,
         },
+        "score": {
+            part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
+            for part in ("innovation", "consistency")
+        },
         "persistence_s": 3.0,
         "short_lead_s": 3.0,
         "guard_start_s": 5.0,
@@ -72,7 +76,7 @@ def small_case(**changes: object) -> Case:
 
 def small_settings(twin: TrainedTwin, **changes: object) -> CapabilitySettings:
     """Return settings whose thresholds tell the small system's pushes apart."""
-    sigma = dict(zip(DETECTORS, (4.0, 4.0, 0.2, 1.0, 0.8), strict=True))
+    sigma = dict(zip(DETECTORS, (4.0, 4.0, 4.0, 4.0, 0.2, 1.0, 0.8), strict=True))
     values = {
         "innovation": InnovationScoreValues.of(fit_small_scores(twin)),
         "thresholds": ThresholdValues(score=4.0, reconstruction=0.2, variance=0.02),

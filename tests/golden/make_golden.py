@@ -19,6 +19,7 @@ import pandas as pd
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, assessments_json
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
     InnovationScore,
@@ -39,6 +40,7 @@ from odisar.config.learning import TwinConfig
 from odisar.config.loader import load_config
 from odisar.evaluation.scored import ScoredRecording
 from odisar.evaluation.tables import detection_table
+from odisar.forecasters.closed_form import design_width
 from odisar.recordings.schema import Interval, Recording, RecordingInfo
 from odisar.simulators.vessel.fleet import RunPlan
 from odisar.simulators.vessel.runs import CHANNELS, simulate_runs
@@ -132,7 +134,7 @@ def twin() -> dict[str, Any]:
     limits = Thresholds(score=SCORE_LIMIT, reconstruction=0.888, variance=0.00085)
     capability = Capability(scorer, limits, attribution_top=2)
     assessments = capability.assess(recording, scores, stride_steps=10, step_s=0.5)
-    first = scorer.innovation_scores.twin.known_after_steps
+    first = scorer.innovation_scores.known_after_steps
     return {
         "score": scores.scores[ODISAR][first:].tolist(),
         "closed_form_score": scores.scores[CLOSED_FORM][first:].tolist(),
@@ -153,7 +155,17 @@ def analytic_scores() -> InnovationScores:
     return InnovationScores(
         InnovationScore(mean, size, recent, 0.3, LogScale(-0.2, 0.1)),
         InnovationScore(mean, size, recent, 0.3, None),
+        InnovationScore(mean, size, recent, 0.4, None),
+        analytic_relations(),
     )
+
+
+def analytic_relations() -> Consistency:
+    """Return relations of a command and two states: each state from the two other features."""
+    weights = np.zeros((2, design_width(3, 1)))
+    weights[0, [0, 2]] = 0.3, -0.4
+    weights[1, [0, 1]] = -0.2, 0.5
+    return Consistency((1, 2), weights)
 
 
 def cosine_twin() -> TrainedTwin:

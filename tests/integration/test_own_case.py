@@ -65,6 +65,10 @@ ROVER = {
         "block_s": 50.0,
         "block_gap_s": 10.0,
     },
+    "score": {
+        part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
+        for part in ("innovation", "consistency")
+    },
     "persistence_s": 1.0,
     "short_lead_s": 1.0,
     "guard_start_s": 2.0,

@@ -39,6 +39,10 @@ def make_case(splits=None, faults=None):
         window={"context_steps": 2, "horizon_steps": 1},
         splits={"kind": "metadata", "fractions": None, "folds": None, "block_s": None,
                 "block_gap_s": None} | (splits or {}),
+        score={
+            part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
+            for part in ("innovation", "consistency")
+        },
         persistence_s=1.0,
         short_lead_s=0.5,
         guard_start_s=10.0,

@@ -163,7 +163,8 @@ def blame_windows(
         own = windows[(windows >= start) & (windows < stop)]
         directions = state_directions(scorer.twin, recording, scores.positions[start:stop])
         innovations = scores.innovations[start:stop]
-        parts.append(signatures.blame(innovations, own - start, directions))
+        samples = scores.samples[start:stop]
+        parts.append(signatures.blame(innovations, samples, own - start, directions))
     return np.concatenate(parts)
 
 

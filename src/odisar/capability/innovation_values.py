@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
     InnovationScore,
@@ -96,11 +97,28 @@ class InnovationValues(Section):
         )
 
 
+class RelationValues(Section):
+    """Relations between the features of a sample: the states' positions, a row of weights each."""
+
+    states: list[Annotated[int, Field(ge=0)]]
+    weights: list[list[_Number]]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if len(self.weights) != len(self.states):
+            raise ValueError(f"weights: expected {len(self.states)} rows, one for each state")
+        if len({len(row) for row in self.weights}) > 1:
+            raise ValueError("weights: expected as many numbers in each row")
+        return self
+
+
 class InnovationScoreValues(Section):
-    """The twin's score and that of its closed form alone."""
+    """The scores that the monitor's is made of, and the relations that one of them judges."""
 
     twin: InnovationValues
     closed_form: InnovationValues
+    consistency: InnovationValues
+    relations: RelationValues
 
     @classmethod
     def of(cls, scores: InnovationScores) -> Self:
@@ -108,17 +126,27 @@ class InnovationScoreValues(Section):
         return cls(
             twin=InnovationValues.of(scores.twin),
             closed_form=InnovationValues.of(scores.closed_form),
+            consistency=InnovationValues.of(scores.consistency),
+            relations=RelationValues(
+                states=list(scores.relations.states), weights=scores.relations.weights.tolist()
+            ),
         )
 
     def build(self) -> InnovationScores:
         """Return the scores."""
-        return InnovationScores(self.twin.build(), self.closed_form.build())
+        tied = self.relations
+        return InnovationScores(
+            self.twin.build(),
+            self.closed_form.build(),
+            self.consistency.build(),
+            Consistency(tuple(tied.states), np.array(tied.weights)),
+        )
 
     @property
     def states(self) -> set[int]:
         """How many state features the covariances are of; more than one number fits no twin."""
         parts: list[_Covariant] = []
-        for score in (self.twin, self.closed_form):
+        for score in (self.twin, self.closed_form, self.consistency):
             parts += [score.mean, score.size, score.recent]
             parts += [mean.limit for mean in (score.mean, score.recent) if mean.limit is not None]
         return {len(part.precision) for part in parts}

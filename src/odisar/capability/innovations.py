@@ -186,7 +186,7 @@ class InnovationSize:
 
 @dataclass(frozen=True)
 class InnovationSteps:
-    """How the score is put together (``capability.innovation`` in params.yaml).
+    """How the score is put together (``score`` of a case in params.yaml).
 
     ``mean``, ``size`` and ``recent`` are numbers of innovations, ``recent_share`` is the weight of
     the last statistic.

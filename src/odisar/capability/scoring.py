@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from odisar.baselines.forecast_error import delayed, forecast_rmse
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import FloatArray, InnovationScore
 from odisar.capability.scores import (
     predictive_variance,
@@ -22,38 +23,70 @@ from odisar.twin.transformer import TwinOutput
 from odisar.windows.targets import horizon_targets
 from odisar.windows.window_set import model_inputs, scaled_features
 
-#: The monitor's score: innovations of the twin and of its closed form. Of the closed form alone.
-#: The paper's.
-ODISAR, CLOSED_FORM, RECONSTRUCTION = "odisar", "closed-form", "reconstruction"
+#: The monitor's score, and the same without its Transformer.
+ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
+#: What these are made of: innovations of the closed form, parity residuals. The paper's score.
+CLOSED_FORM, CONSISTENCY, RECONSTRUCTION = "closed-form", "consistency", "reconstruction"
 #: The forecast-error baselines.
 RMSE, RMSE_SHORT = "rmse", "rmse-short-lead"
-DETECTORS = (ODISAR, CLOSED_FORM, RECONSTRUCTION, RMSE, RMSE_SHORT)
+DETECTORS = (
+    ODISAR,
+    WITHOUT_TRANSFORMER,
+    CLOSED_FORM,
+    CONSISTENCY,
+    RECONSTRUCTION,
+    RMSE,
+    RMSE_SHORT,
+)
 
 
 @dataclass(frozen=True)
 class InnovationScores:
-    """Fitted scores of the twin's innovations, and of those of the closed form it stands on.
+    """Fitted scores of innovations, the twin's and its closed form's, and of parity residuals.
 
-    The monitor's is their geometric mean. The two err for different reasons, the Transformer where
-    it has learnt too little or what it shouldn't, the closed form where things are not linear.
+    The monitor's is the geometric mean of the three. They err for different reasons: the
+    Transformer where it has learnt too little or what it shouldn't, the closed form where things
+    are not linear, both where a fault has been in their past for a while, and the ``relations``
+    within a sample, whose residuals ``consistency`` judges, wherever only time would tell.
     """
 
     twin: InnovationScore
     closed_form: InnovationScore
+    consistency: InnovationScore
+    relations: Consistency
+
+    @property
+    def known_after_steps(self) -> int:
+        """How many steps after its first forecast a run has its first score."""
+        parts = (self.twin, self.closed_form, self.consistency)
+        return max(part.known_after_steps for part in parts)
 
     def of(
-        self, innovations: FloatArray, closed_form: FloatArray, reconstruction: FloatArray
+        self,
+        innovations: FloatArray,
+        closed_form: FloatArray,
+        samples: NDArray[np.float32],
+        reconstruction: FloatArray,
     ) -> dict[str, NDArray[np.float32]]:
         """Return (window,) scores by detector along one gapless run.
 
-        Innovations are (window, state feature), ``reconstruction`` errors (window,).
+        Innovations are (window, state feature), ``samples`` (window, feature), ``reconstruction``
+        errors (window,).
         """
         twin = self.twin.score(innovations, reconstruction)
         closed = self.closed_form.score(closed_form, reconstruction)
-        return {
-            ODISAR: (np.sqrt(twin) * np.sqrt(closed)).astype(np.float32),
-            CLOSED_FORM: closed.astype(np.float32),
+        tied = self.consistency.score(self.relations.residuals(samples), reconstruction)
+        made = {
+            ODISAR: _geometric_mean(twin, closed, tied),
+            WITHOUT_TRANSFORMER: _geometric_mean(closed, tied),
+            CLOSED_FORM: closed,
+            CONSISTENCY: tied,
         }
+        return {name: scores.astype(np.float32) for name, scores in made.items()}
+
+
+def _geometric_mean(*scores: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(np.mean(np.log(scores), axis=0)))
 
 
 @dataclass(frozen=True)
@@ -63,8 +96,8 @@ class RecordingScores:
     ``positions`` (window,) are sample positions t; ``scores`` maps a detector to (window,) what it
     says at t, NaN while it cannot say anything yet; ``state_errors`` (window, state) are those of
     the reconstruction, ``innovations`` and ``closed_form_innovations`` (window, state feature) are
-    NaN where there was no forecast of t yet; all scaled. ``runs`` are half-open ranges of windows
-    without a gap.
+    NaN where there was no forecast of t yet, ``samples`` (window, feature) what was seen at t; all
+    scaled. ``runs`` are half-open ranges of windows without a gap.
     """
 
     positions: NDArray[np.int64]
@@ -72,6 +105,7 @@ class RecordingScores:
     state_errors: NDArray[np.float32]
     innovations: NDArray[np.float64]
     closed_form_innovations: NDArray[np.float64]
+    samples: NDArray[np.float32]
     runs: tuple[tuple[int, int], ...]
 
 
@@ -110,7 +144,8 @@ class Scorer:
             if positions.size:
                 observed = recording.values[: segment[1]]
                 parts.append(self._score_segment(samples, observed, positions, short_lead_steps))
-        return _joined(parts, len(self.twin.spec.outputs), len(self._network.state_features))
+        states, features = len(self._network.state_features), len(self.twin.scaler.mean)
+        return _joined(parts, len(self.twin.spec.outputs), states, features)
 
     def draws(self, recording: Recording, positions: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return (draw, window, step, state) the dropout draws of forecasts, scaled."""
@@ -169,7 +204,8 @@ class Scorer:
             short.append(forecast_rmse(forecast, truth, short_lead))
             following.append(output.next_sample.numpy())
             closed.append(self._closed_form(context))
-        scaled = samples[positions][:, list(self._network.state_features)].numpy()
+        seen = samples[positions].numpy()
+        scaled = seen[:, list(self._network.state_features)]
         errors = np.concatenate(state_errors)
         rebuilt = reconstruction_error(errors)
         scores = {
@@ -180,10 +216,10 @@ class Scorer:
         innovations = _innovations(scaled, np.concatenate(following))
         closed_form = _innovations(scaled, np.concatenate(closed))
         if self.innovation_scores is not None:
-            fitted = self.innovation_scores
-            scores = fitted.of(innovations, closed_form, rebuilt.astype(np.float64)) | scores
+            fitted, errors_now = self.innovation_scores, rebuilt.astype(np.float64)
+            scores = fitted.of(innovations, closed_form, seen, errors_now) | scores
         run = ((0, len(positions)),)
-        return RecordingScores(positions, scores, errors, innovations, closed_form, run)
+        return RecordingScores(positions, scores, errors, innovations, closed_form, seen, run)
 
     @torch.inference_mode()
     def _closed_form(self, context: torch.Tensor) -> NDArray[np.float32]:
@@ -219,15 +255,18 @@ def _innovations(scaled: NDArray[np.float32], following: NDArray[np.float32]) ->
     return innovations
 
 
-def _joined(parts: list[RecordingScores], states: int, features: int) -> RecordingScores:
+def _joined(
+    parts: list[RecordingScores], outputs: int, states: int, features: int
+) -> RecordingScores:
     if not parts:
-        empty, none = np.empty(0, dtype=np.float32), np.empty((0, features))
+        empty, none = np.empty(0, dtype=np.float32), np.empty((0, states))
         return RecordingScores(
             np.empty(0, dtype=np.int64),
             dict.fromkeys(DETECTORS, empty),
-            np.empty((0, states), dtype=np.float32),
+            np.empty((0, outputs), dtype=np.float32),
             none,
             none,
+            np.empty((0, features), dtype=np.float32),
             (),
         )
     lengths = [len(part.positions) for part in parts]
@@ -238,5 +277,6 @@ def _joined(parts: list[RecordingScores], states: int, features: int) -> Recordi
         np.concatenate([part.state_errors for part in parts]),
         np.concatenate([part.innovations for part in parts]),
         np.concatenate([part.closed_form_innovations for part in parts]),
+        np.concatenate([part.samples for part in parts]),
         tuple(pairwise(borders)),
     )

@@ -1,12 +1,13 @@
 """Which state to blame for innovations: the one whose fault would explain most of them.
 
-For every state, the part of a squared distance that a change of this state alone takes away: the
-generalised likelihood ratio of a change along the state's *signature* (Alcala and Qin,
-Automatica 2009, call it a reconstruction-based contribution). The signature is a step response:
-in its first sample a fault shows in its own state alone; afterwards the forecasts are made from
-faulty samples, and what stays is the step less what the closed form carries on of it. What stays
-can be the same for two states that physics ties (a velocity that reads too high, a position that
-creeps), so the onset is remembered for as long as the alarm lasts.
+For every state two kinds of fault are held against the innovations, from any moment at which the
+current alarm may have begun: a shift that lasts, and noise. Each says by a generalised likelihood
+ratio (Willsky and Jones, IEEE Trans. Automatic Control 1976) how much better it explains them than
+no fault does. A shift is sought along its *signature*: in its first sample it shows in its own
+state alone; afterwards forecasts are made from faulty samples, and what shows is the shift less
+what the closed form, linearised where the machine is, carries on of it. What stays can be nearly
+the same for two states that physics ties (a velocity that reads too high, a position that creeps);
+the first sample isn't, and all of them together tell.
 """
 
 from dataclasses import dataclass
@@ -20,8 +21,6 @@ from odisar.twin.bundle import TrainedTwin
 
 #: A direction that is not seen at all explains nothing; keeps 0 / 0 out.
 _SMALLEST = 1.0e-12
-#: So many samples of a step response tell states apart before what stays of it takes over.
-_ONSET_STEPS = 3
 
 
 def blamed_names(twin: TrainedTwin) -> tuple[str, ...]:
@@ -55,94 +54,155 @@ def state_directions(
     return (directions / twin.scaler.std)[:, features][:, :, features]
 
 
-def step_response(twin: TrainedTwin) -> FloatArray:
-    """Return (step, state feature, state feature) the innovations that a lasting shift leaves.
+@dataclass(frozen=True)
+class StepResponse:
+    """What innovations a unit shift of a state feature leaves, by its age in steps.
 
-    Column j of the first is what shows, in every feature, of a unit shift of feature j when it
-    sets in; of the next what shows one step later; of the last what stays: the shift less what
-    the linear part of the closed form makes of its earlier samples.
+    ``linear`` (age, state feature, state feature) is that of the linear part of the closed form:
+    column j of the first is what shows, in every feature, of a shift of feature j when it sets in;
+    of the last what stays. ``products`` (state feature, feature, feature), symmetric, and
+    ``squares`` (state feature, feature) are the weights of its other regressors; ``states`` are
+    the positions of state features among the features.
     """
-    closed = twin.network.next_closed_form
-    count = len(twin.scaler.mean)
-    features = list(twin.network.state_features)
-    lags = closed.weights[: closed.lags * count].double().cpu().numpy()
-    newest_first = lags.reshape(closed.lags, count, -1)[::-1, features]
-    carried = np.cumsum(newest_first, axis=0).transpose(0, 2, 1)
-    return np.asarray(np.eye(len(features)) - np.concatenate([np.zeros_like(carried[:1]), carried]))
+
+    linear: FloatArray
+    products: FloatArray
+    squares: FloatArray
+    states: tuple[int, ...]
+
+    @classmethod
+    def of(cls, twin: TrainedTwin) -> "StepResponse":
+        """Return the response of a twin's closed form of the next sample."""
+        closed, states = twin.network.next_closed_form, twin.network.state_features
+        count = len(twin.scaler.mean)
+        weights = closed.weights.double().cpu().numpy()
+        lags, rest = np.split(weights, [closed.lags * count])
+        newest_first = lags.reshape(closed.lags, count, -1)[::-1, list(states)]
+        carried = np.cumsum(newest_first, axis=0).transpose(0, 2, 1)
+        carried = np.concatenate([np.zeros_like(carried[:1]), carried])
+        first, second = np.triu_indices(count)
+        products = np.zeros((weights.shape[1], count, count))
+        products[:, first, second] = rest[: len(first)].T
+        products = products + products.transpose(0, 2, 1)
+        return cls(np.eye(len(states)) - carried, products, rest[len(first) : -1].T, tuple(states))
+
+    def at(self, samples: NDArray[np.floating]) -> FloatArray:
+        """Return (age, time, state feature, state feature) the response along one gapless run.
+
+        ``samples`` (time, feature), scaled: what the closed form makes of a shift depends on where
+        the machine was one step before, as products and squares of that sample are in it.
+        """
+        before = np.nan_to_num(np.concatenate([samples[:1], samples[:-1]]).astype(np.float64))
+        slope = np.einsum("sfg,tg->tsf", self.products, before)
+        slope += 2.0 * self.squares * np.abs(before)[:, None, :]
+        response = np.repeat(self.linear[:, None], len(samples), axis=1)
+        response[1:] -= slope[:, :, list(self.states)]
+        return response
 
 
 @dataclass(frozen=True)
 class Signatures:
-    """Attribution of an innovation score; ``response`` as ``step_response`` gives it."""
+    """Attribution of an innovation score: whose fault would explain the innovations."""
 
     score: InnovationScore
-    response: FloatArray
+    response: StepResponse
 
     @classmethod
     def of(cls, twin: TrainedTwin, score: InnovationScore) -> "Signatures":
         """Return the signatures of a twin."""
-        return cls(score, step_response(twin))
+        return cls(score, StepResponse.of(twin))
 
     def blame(
-        self, innovations: FloatArray, windows: NDArray[np.int64], directions: FloatArray
+        self,
+        innovations: FloatArray,
+        samples: NDArray[np.floating],
+        windows: NDArray[np.int64],
+        directions: FloatArray,
     ) -> FloatArray:
         """Return (window, state) how much of what is seen each state explains, in std deviations.
 
-        ``innovations`` (time, state feature) are one gapless run, ``windows`` which of its times
-        are asked for, ``directions`` (time, state, state feature) those of ``state_directions``.
-        What a state explains is the sum of two squares: of the mean of the last innovations, and
-        of the onset of the current alarm.
+        ``innovations`` (time, state feature) and ``samples`` (time, feature) are of one gapless
+        run, ``windows`` which of its times are asked for, ``directions`` (time, state, state
+        feature) those of ``state_directions``. It is the root of twice the log likelihood ratio of
+        the state's better fault, a shift or noise, at the best of its possible onsets.
         """
-        return np.sqrt(
-            self._of_mean(innovations, windows, directions[windows])
-            + self._of_onset(innovations, windows, directions)
-        )
-
-    def _of_mean(
-        self, innovations: FloatArray, windows: NDArray[np.int64], directions: FloatArray
-    ) -> FloatArray:
-        mean = self.score.mean
-        means = mean.means(innovations)[windows]
-        ends = [directions @ response.T for response in (self.response[0], self.response[-1])]
-        explained = [_explained(means, end, mean.precision) for end in ends]
-        return np.asarray(np.max(explained, axis=0))
-
-    def _of_onset(
-        self, innovations: FloatArray, windows: NDArray[np.int64], directions: FloatArray
-    ) -> FloatArray:
-        """Return (window, state) the most that a step explains which set in during the alarm."""
-        jumps = self._jumps(np.nan_to_num(innovations), directions)
+        seen = _Seen.of(self, np.nan_to_num(innovations), samples, directions)
         # What is rare now may have set in when the oldest sample that is looked at came.
         memory = max(self.score.mean.steps, self.score.size.steps)
-        lead_in = memory + len(jumps) - 1
+        lead_in = memory + len(self.response.linear) - 1
         starts = alarm_starts(self.score.parts(innovations).max(axis=0) >= 1, memory)
         found = np.zeros((len(windows), directions.shape[1]))
         for row, window in enumerate(windows):
-            first = max(0, int(starts[window]) - lead_in)
-            for length, jump in enumerate(jumps, start=1):
-                # Of the last steps only the beginning is known yet.
-                end = max(0, window - length + 2)
-                own = jump[first if length == len(jumps) else max(first, end - 1) : end]
-                found[row] = np.maximum(found[row], own.max(axis=0, initial=0.0))
-        return found
+            first, last = max(0, int(starts[window]) - lead_in), int(window)
+            found[row] = np.maximum(seen.shifts(first, last), seen.noises(first, last))
+        return np.sqrt(found)
 
-    def _jumps(self, innovations: FloatArray, directions: FloatArray) -> list[FloatArray]:
-        """Return (time, state) what a step that sets in there explains of the samples after it.
 
-        One for each number of samples that are looked at, up to ``_ONSET_STEPS``.
+@dataclass(frozen=True)
+class _Seen:
+    """A run of innovations against every state's signature, in sums that any onset is read from.
+
+    ``along`` and ``size`` (age, time, state) are the products of a signature of that age with the
+    innovation and with itself, in the metric of single innovations; ``staying`` (2, time + 1,
+    state) sums both over time at the last age, ``fresh`` (time + 1, state) sums squares along the
+    first, in variances.
+    """
+
+    along: FloatArray
+    size: FloatArray
+    staying: FloatArray
+    fresh: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        signatures: Signatures,
+        innovations: FloatArray,
+        samples: NDArray[np.floating],
+        directions: FloatArray,
+    ) -> "_Seen":
+        precision = signatures.score.size.precision
+        shown = np.einsum("tsf,atgf->atsg", directions, signatures.response.at(samples))
+        weighed = shown @ precision
+        along = np.einsum("atsf,tf->ats", weighed, innovations)
+        size = np.einsum("atsf,atsf->ats", weighed, shown)
+        squares = along[0] ** 2 / np.maximum(size[0], _SMALLEST)
+        return cls(along, size, _summed(np.stack([along[-1], size[-1]])), _summed(squares))
+
+    def shifts(self, first: int, last: int) -> FloatArray:
+        """Return (state,) the most that a shift explains which set in from ``first`` to ``last``.
+
+        Twice its log likelihood ratio: the square along the signature over the signature's own.
         """
-        precision, count = self.score.size.precision, len(innovations)
-        along = np.zeros(directions.shape[:2])
-        size = np.zeros(directions.shape[:2])
-        jumps = []
-        for step, response in enumerate(self.response[:_ONSET_STEPS]):
-            shown = directions @ response.T @ precision
-            later = np.zeros_like(innovations)
-            later[: max(0, count - step)] = innovations[step:]
-            along = along + np.einsum("tsf,tf->ts", shown, later)
-            size = size + np.einsum("tsf,tsf->ts", shown, directions @ response.T)
-            jumps.append(along**2 / np.maximum(size, _SMALLEST))
-        return jumps
+        onsets = np.arange(first, last + 1)
+        parts = []
+        for values, staying in ((self.along, self.staying[0]), (self.size, self.staying[1])):
+            oldest = len(values) - 1
+            total = staying[last + 1] - staying[np.minimum(onsets + oldest, last + 1)]
+            for age in range(oldest):
+                at = onsets[onsets + age <= last]
+                total[: len(at)] += values[age, at + age]
+            parts.append(total)
+        return np.asarray((parts[0] ** 2 / np.maximum(parts[1], _SMALLEST)).max(axis=0))
+
+    def noises(self, first: int, last: int) -> FloatArray:
+        """Return (state,) the most that noise explains which set in from ``first`` to ``last``.
+
+        Twice its log likelihood ratio, n (v - 1 - log v) of a variance that has grown to v. One
+        sample alone is no noise.
+        """
+        onsets = np.arange(first, last)
+        if not len(onsets):
+            return np.zeros(self.fresh.shape[1])
+        count = (last + 1 - onsets)[:, None]
+        variance = np.maximum(1.0, (self.fresh[last + 1] - self.fresh[onsets]) / count)
+        return np.asarray((count * (variance - 1 - np.log(variance))).max(axis=0))
+
+
+def _summed(values: FloatArray) -> FloatArray:
+    """Return sums over time, the last axis but one, of the first so many values."""
+    start = np.zeros_like(values[..., :1, :])
+    return np.concatenate([start, np.cumsum(values, axis=-2)], axis=-2)
 
 
 def alarm_starts(is_rare: NDArray[np.bool_], gap_steps: int) -> NDArray[np.int64]:
@@ -156,12 +216,3 @@ def alarm_starts(is_rare: NDArray[np.bool_], gap_steps: int) -> NDArray[np.int64
     begins = in_alarm & ~np.concatenate([[False], in_alarm[:-1]])
     started = np.maximum.accumulate(np.where(begins, times, 0))
     return np.asarray(np.where(in_alarm, started, times))
-
-
-def _explained(
-    innovations: FloatArray, directions: FloatArray, precision: FloatArray
-) -> FloatArray:
-    """Return (window, state) the squared distance that a change along each direction takes away."""
-    along = np.einsum("wsf,fg,wg->ws", directions, precision, innovations)
-    size = np.einsum("wsf,fg,wsg->ws", directions, precision, directions)
-    return np.asarray(along**2 / np.maximum(size, _SMALLEST))

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from odisar.config.base import Fraction, PositiveFloat, PositiveInt, Section
 from odisar.config.faults import Faults
 from odisar.config.formats import BagFormat, CsvFormat
+from odisar.config.score import ScoreConfig
 
 #: What can make a case's recordings where they are missing.
 Maker = Literal["ferry-simulator", "gunnerus-trial", "robot-simulator", "omni3-runs", "none"]
@@ -155,6 +156,7 @@ class Case(Section):
     pose: Pose | None
     window: WindowConfig
     splits: Splits
+    score: ScoreConfig
     persistence_s: PositiveFloat
     short_lead_s: PositiveFloat
     guard_start_s: PositiveFloat

@@ -10,19 +10,9 @@ from odisar.config.cases import Case
 _GUARDS = ("guard_start_s", "guard_end_s")
 
 
-class InnovationConfig(Section):
-    """How many of the last innovations the statistics of the score look at, and their weights."""
-
-    mean_steps: PositiveInt
-    size_steps: PositiveInt
-    recent_steps: PositiveInt
-    recent_share: Annotated[float, Field(ge=0, lt=1)]
-
-
 class CapabilityConfig(Section):
-    """The score, thresholds and attribution (paper, section "Creating DTC")."""
+    """Thresholds and attribution (paper, section "Creating DTC")."""
 
-    innovation: InnovationConfig
     threshold_rule: Literal["sigma", "log-sigma", "operating", "conformal"]
     threshold_sigmas: PositiveFloat
     attribution_top: PositiveInt

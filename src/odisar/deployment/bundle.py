@@ -21,6 +21,7 @@ from odisar.deployment.manifest import (
     write_manifest,
 )
 from odisar.errors import OdisarError
+from odisar.forecasters.closed_form import design_width
 from odisar.twin.bundle import TrainedTwin, read_twin, write_twin
 from odisar.windows.coordinates import pose_channels
 
@@ -131,6 +132,15 @@ def _check_innovation(folder: Path, twin: TrainedTwin, settings: CapabilitySetti
             f"{folder / CAPABILITY_FILE}: innovation has covariances of "
             f"{sorted(settings.innovation.states)} states, the twin {states}; write the bundle "
             "again from one run of the pipeline"
+        )
+    tied, regressors = settings.innovation.relations, design_width(len(twin.scaler.mean), 1)
+    if tuple(tied.states) != tuple(twin.network.state_features) or any(
+        len(row) != regressors for row in tied.weights
+    ):
+        raise OdisarError(
+            f"{folder / CAPABILITY_FILE}: innovation.relations are not of the twin's {states} "
+            f"states with {regressors} weights each; write the bundle again from one run of the "
+            "pipeline"
         )
 
 

@@ -97,7 +97,7 @@ def _positions(scorer: Scorer, recording: Recording, stride_steps: int) -> NDArr
     spec = scorer.twin.spec
     ahead = spec.horizon_steps if spec.known_ahead else 0
     assert scorer.innovation_scores is not None  # noqa: S101 (who asks has calibrated)
-    first = max(spec.horizon_steps, scorer.innovation_scores.twin.known_after_steps)
+    first = max(spec.horizon_steps, scorer.innovation_scores.known_after_steps)
     return np.concatenate(
         [
             spec.issue_positions(segment, 1, horizon_steps=ahead)[first::stride_steps]

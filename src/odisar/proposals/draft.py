@@ -205,6 +205,10 @@ def _judging(draft: Draft) -> Iterator[str]:
     plan, rate_hz = draft.plan, draft.rate_hz
     lead = max(round(plan.horizon / 5), 1) / rate_hz
     guard = max(min(plan.horizon, plan.fault_duration // 4), 1) / rate_hz
+    yield line(8, "score:", note="how many samples each statistic looks back")
+    for part, recent, share in (("innovation", 3, 0.3), ("consistency", 1, 0.4)):
+        windows = flow(mean_steps=10, size_steps=10, recent_steps=recent, recent_share=share)
+        yield line(12, f"{part}: {windows}")
     yield line(
         8,
         f"persistence_s: {scalar(draft.persistence_s)}",

@@ -4,12 +4,21 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 ORACLE = "oracle"
-#: The detector that the project is about, the same without its Transformer, and the paper's score.
-MONITOR, CLOSED_FORM, RECONSTRUCTION = "odisar", "closed-form", "reconstruction"
+#: The detector that the project is about, the same without its Transformer, its other parts, and
+#: the paper's score.
+MONITOR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
+CLOSED_FORM, CONSISTENCY, RECONSTRUCTION = "closed-form", "consistency", "reconstruction"
 
 #: The twin's scores, and what the paper holds them against: the error of its forecasts.
 FORECAST_ERRORS = ("rmse", "rmse-short-lead")
-TWIN_SCORES = (MONITOR, CLOSED_FORM, RECONSTRUCTION, *FORECAST_ERRORS)
+TWIN_SCORES = (
+    MONITOR,
+    WITHOUT_TRANSFORMER,
+    CLOSED_FORM,
+    CONSISTENCY,
+    RECONSTRUCTION,
+    *FORECAST_ERRORS,
+)
 #: What a user would try first: fitted in seconds, without a twin.
 CHEAP = (
     "mahalanobis",
@@ -38,7 +47,9 @@ NOT_DEPLOYABLE = ("published-recipe", "published-recipe-last-state")
 
 DETECTOR_NAMES = {
     MONITOR: "ODiSAR",
+    WITHOUT_TRANSFORMER: "ODiSAR without Transformer",
     CLOSED_FORM: "closed form alone",
+    CONSISTENCY: "consistency alone",
     RECONSTRUCTION: "reconstruction (paper's score, causal)",
     "rmse": "forecast RMSE",
     "rmse-short-lead": "forecast RMSE, short lead",
@@ -66,7 +77,9 @@ DETECTOR_NAMES = {
 # told apart with any kind of colour vision. Detectors drawn in one figure differ in marker too.
 _LOOKS = {
     MONITOR: ("#0072B2", "o"),
+    WITHOUT_TRANSFORMER: ("#009E73", "P"),
     CLOSED_FORM: ("#56B4E9", "s"),
+    CONSISTENCY: ("#CC79A7", "<"),
     RECONSTRUCTION: ("#D55E00", "D"),
     "rmse": ("#E69F00", "^"),
     "rmse-short-lead": ("#8A6D00", "v"),

@@ -1,11 +1,11 @@
-"""What the Transformer adds to its closed form, and what the monitor has over other scores."""
+"""What the Transformer adds to the score, and what the monitor has over other scores."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
 
-from odisar.report.detectors import CLOSED_FORM, RECONSTRUCTION, detector_name
+from odisar.report.detectors import RECONSTRUCTION, WITHOUT_TRANSFORMER, detector_name
 from odisar.report.figures.pairs import pairs_of
 from odisar.report.load import Results, rows_of
 from odisar.report.style import METRIC_NAMES, SHARES, strength_name
@@ -17,9 +17,9 @@ ADDS, NOTHING, HARMS, UNKNOWN = "adds", "nothing", "harms", "unknown"
 
 def transformer_gain(results: Results, setup: str) -> list[str]:
     """Say where the Transformer adds something, where nothing, and where it harms (P2, overall)."""
-    rows = _against(results, setup, CLOSED_FORM)
+    rows = _against(results, setup, WITHOUT_TRANSFORMER)
     if rows.empty:
-        return [f"{setup}: nothing was compared with the closed form alone."]
+        return [f"{setup}: nothing was compared with the score without its Transformer."]
     by_verdict: dict[str, list[Any]] = {}
     for row in rows_of(rows):
         by_verdict.setdefault(verdict(row), []).append(row)
@@ -34,7 +34,7 @@ def transformer_gain(results: Results, setup: str) -> list[str]:
         parts.append(f"no difference beyond {_interval(results)} in {found[NOTHING]}")
     if UNKNOWN in found:
         parts.append(f"too few recordings for an interval in {found[UNKNOWN]}")
-    head = f"{setup}: what the Transformer adds to its closed form alone (P2, overall)"
+    head = f"{setup}: what the Transformer adds to closed form and consistency (P2, overall)"
     return [f"{head}: {'; '.join(parts)}."]
 
 

@@ -100,7 +100,7 @@ def _bundle(job: _Job) -> DevelopmentScore:
     settings = _settings(config, limits, twin.spec.horizon_steps)
     data = load_member(config, workspace, member)
     # A score is known once so many innovations are; relative poses have no increment at first.
-    surplus = settings.innovation.twin.build().known_after_steps + 1
+    surplus = settings.innovation.build().known_after_steps + 1
     example = _example(data.splits["calibration"], case_name, case, surplus)
     folder = workspace.bundle(member.setup)
     write_bundle(folder, twin, case, settings, origin, example)

@@ -198,9 +198,7 @@ def _calibrate(job: _Job) -> MemberCalibration:
     data = load_member(config, workspace, job.member)
     twin = read_twin(workspace.twin(job.member.name))
     batch, device = config.capability.scoring_batch, pick_device(config.pipeline.accelerator)
-    innovation = fit_innovation_scores(
-        Scorer(twin, batch, device), data, config.capability.innovation
-    )
+    innovation = fit_innovation_scores(Scorer(twin, batch, device), data)
     scorer = Scorer(twin, batch, device, innovation)
     detectors = MemberDetectors.fit(data, scorer, config.seed)
     calibration = data.splits["calibration"]

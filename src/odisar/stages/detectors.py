@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from odisar.baselines.interface import Detector, Reference
 from odisar.baselines.range_rule import range_rule_scores
 from odisar.baselines.registry import cheap_detectors, fit_existing
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationScore, InnovationSteps
 from odisar.capability.scoring import (
     RECONSTRUCTION,
@@ -16,10 +17,12 @@ from odisar.capability.scoring import (
     RecordingScores,
     Scorer,
 )
-from odisar.config.judging import InnovationConfig
+from odisar.config.score import StatisticsConfig
 from odisar.recordings.schema import Recording
 from odisar.seeding import derive_seed
 from odisar.stages.members import MemberData
+from odisar.twin.bundle import TrainedTwin
+from odisar.windows.window_set import scaled_features
 
 #: Detectors whose threshold is 1 by construction: range rules.
 RULE_THRESHOLD = 1.0
@@ -70,20 +73,35 @@ def member_reference(data: MemberData, seed: int) -> Reference:
     )
 
 
-def fit_innovation_scores(
-    scorer: Scorer, data: MemberData, config: InnovationConfig
-) -> InnovationScores:
-    """Fit the innovation scores on validation recordings: no weight was fitted to them."""
+def fit_innovation_scores(scorer: Scorer, data: MemberData) -> InnovationScores:
+    """Fit what the monitor's score is made of.
+
+    The relations within a sample on training recordings, all else on validation recordings: no
+    weight was fitted to them.
+    """
+    relations = fit_relations(data, scorer.twin)
     found = [
         scorer.score(item, short_lead_steps=data.case.short_lead_steps)
         for item in data.splits["validation"]
     ]
     runs = [(scores, slice(a + 1, b)) for scores in found for a, b in scores.runs]
     rebuilt = [s.scores[RECONSTRUCTION][at].astype(np.float64) for s, at in runs]
-    steps = InnovationSteps(
-        config.mean_steps, config.size_steps, config.recent_steps, config.recent_share
-    )
+    steps, tied = _steps(data.case.score.innovation), _steps(data.case.score.consistency)
     return InnovationScores(
         InnovationScore.fit([s.innovations[at] for s, at in runs], rebuilt, steps),
         InnovationScore.fit([s.closed_form_innovations[at] for s, at in runs], None, steps),
+        InnovationScore.fit([relations.residuals(s.samples[at]) for s, at in runs], None, tied),
+        relations,
+    )
+
+
+def fit_relations(data: MemberData, twin: TrainedTwin) -> Consistency:
+    """Fit the relations that hold within a sample on the training recordings."""
+    samples = scaled_features(data.splits["train"], twin.scaler, twin.spec)
+    return Consistency.fit(samples.numpy(), twin.network.state_features)
+
+
+def _steps(config: StatisticsConfig) -> InnovationSteps:
+    return InnovationSteps(
+        config.mean_steps, config.size_steps, config.recent_steps, config.recent_share
     )

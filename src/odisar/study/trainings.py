@@ -78,5 +78,5 @@ def variant_twin(
 def fitted_scorer(config: ConfigView, data: MemberData, twin: TrainedTwin) -> Scorer:
     """Return a scorer with innovation scores fitted on the validation recordings."""
     batch, device = config.capability.scoring_batch, pick_device(config.pipeline.accelerator)
-    fitted = fit_innovation_scores(Scorer(twin, batch, device), data, config.capability.innovation)
+    fitted = fit_innovation_scores(Scorer(twin, batch, device), data)
     return Scorer(twin, batch, device, fitted)

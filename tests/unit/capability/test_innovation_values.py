@@ -2,11 +2,13 @@
 
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.innovations import InnovationScore, InnovationSteps
 from odisar.capability.scoring import InnovationScores
@@ -19,9 +21,21 @@ def fitted(states: int = 2) -> InnovationScores:
     runs, rebuilt = [random.normal(size=(200, states))], [np.exp(random.normal(size=200))]
     # One that stands out, so that the limit counts.
     runs[0][50] *= 20
+    samples = random.normal(size=(200, states + 1))
+    relations = Consistency.fit(samples, range(states))
     return InnovationScores(
-        InnovationScore.fit(runs, rebuilt, steps), InnovationScore.fit(runs, None, steps)
+        InnovationScore.fit(runs, rebuilt, steps),
+        InnovationScore.fit(runs, None, steps),
+        InnovationScore.fit([relations.residuals(samples)], None, replace(steps, mean=8)),
+        relations,
     )
+
+
+def fresh(stream: str) -> tuple[np.ndarray, ...]:
+    """Return innovations, those of the closed form, samples and reconstruction errors."""
+    random = generator(5, stream)
+    innovations, samples = random.normal(size=(2, 50, 2)), random.normal(size=(50, 3))
+    return *innovations, samples.astype(np.float32), np.exp(random.normal(size=50))
 
 
 @pytest.fixture
@@ -31,13 +45,11 @@ def content():
 
 def test_a_score_comes_back_from_json_and_says_the_same(content):
     scores, back = fitted(), InnovationScoreValues.model_validate(content).build()
-    random = generator(5, "fresh")
-    innovations, rebuilt = random.normal(size=(2, 50, 2)), np.exp(random.normal(size=50))
-    wanted, found = scores.of(*innovations, rebuilt), back.of(*innovations, rebuilt)
+    wanted, found = scores.of(*fresh("fresh")), back.of(*fresh("fresh"))
     assert wanted.keys() == found.keys()
     for name, values in wanted.items():
         np.testing.assert_array_equal(found[name], values)
-    assert back.twin.known_after_steps == 6
+    assert (back.twin.known_after_steps, back.known_after_steps) == (6, 8)
     assert back.closed_form.reconstruction is None
 
 
@@ -102,9 +114,28 @@ def test_a_part_that_is_missing_is_named(content, key):
         InnovationScoreValues.model_validate(content)
 
 
-def test_the_monitors_score_is_the_geometric_mean_of_the_twins_and_the_closed_forms():
-    scores, random = fitted(), generator(5, "both")
-    innovations, rebuilt = random.normal(size=(2, 50, 2)), np.exp(random.normal(size=50))
-    found = scores.of(*innovations, rebuilt)
-    twin = scores.twin.score(innovations[0], rebuilt)
-    np.testing.assert_allclose(found["odisar"] ** 2, twin * found["closed-form"], rtol=1e-5)
+def test_the_monitors_score_is_the_geometric_mean_of_its_three_parts():
+    scores, seen = fitted(), fresh("both")
+    found = scores.of(*seen)
+    twin = scores.twin.score(seen[0], seen[-1])
+    closed, tied = found["closed-form"], found["consistency"]
+    np.testing.assert_allclose(found["odisar"] ** 3, twin * closed * tied, rtol=1e-5)
+    np.testing.assert_allclose(found["without-transformer"] ** 2, closed * tied, rtol=1e-5)
+    residuals = scores.relations.residuals(seen[2])
+    np.testing.assert_allclose(tied, scores.consistency.score(residuals, seen[-1]), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "complaint"),
+    [
+        ("weights", [[1.0, 2.0]], "expected 2 rows"),
+        ("weights", [[1.0, 2.0], [1.0]], "as many numbers in each row"),
+        ("weights", [[1.0], [float("nan")]], "weights.1.0"),
+        ("states", [0, -1], "states.1"),
+        ("note", 1, "Extra inputs"),
+    ],
+)
+def test_relations_that_can_be_none_are_refused(content, key, value, complaint):
+    content["relations"][key] = value
+    with pytest.raises(ValidationError, match=complaint):
+        InnovationScoreValues.model_validate(content)

@@ -1,6 +1,5 @@
 """Blame falls on the state whose fault it is."""
 
-import copy
 from collections import Counter
 from dataclasses import replace
 
@@ -9,16 +8,18 @@ import pytest
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, blame_windows
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationScore, InnovationSteps
 from odisar.capability.scoring import InnovationScores, Scorer
 from odisar.capability.signatures import (
     Signatures,
+    StepResponse,
     alarm_starts,
     blamed_names,
     state_directions,
-    step_response,
 )
 from odisar.config.loader import load_config
+from odisar.forecasters.closed_form import design
 from odisar.recordings.schema import Recording
 from odisar.seeding import generator
 from odisar.twin.bundle import TrainedTwin
@@ -118,7 +119,8 @@ def drive_scorer(plan):
     ]
     runs = [run for scores in scored for run in runs_of(scores, scores.innovations)]
     score = InnovationScore.fit(runs, None, STEPS)
-    return Scorer(twin, 64, "cpu", InnovationScores(score, score))
+    relations = Consistency.fit(scored[0].samples, twin.network.state_features)
+    return Scorer(twin, 64, "cpu", InnovationScores(score, score, score, relations))
 
 
 def turned(drive: Recording, angle: float) -> Recording:
@@ -176,26 +178,36 @@ def test_without_a_pose_a_state_is_its_own_feature(trained_twin):
     np.testing.assert_allclose(directions, [wanted, wanted])
 
 
-def test_a_step_leaves_what_the_closed_form_does_not_carry_on(trained_twin):
-    network = copy.deepcopy(trained_twin.network)
-    closed = network.next_closed_form
-    closed.weights[closed.lags * len(CHANNELS) :] = 0.0  # products and squares are left aside
-    response = step_response(replace(trained_twin, network=network))
-    assert len(response) == closed.lags + 1
-    context = torch.zeros(1, SPEC.context_steps, len(CHANNELS))
-    for since in range(closed.lags + 1):
-        for column, feature in enumerate(network.state_features):
+def test_a_step_leaves_what_the_closed_form_does_not_carry_on_from_where_the_machine_is(
+    trained_twin,
+):
+    network = trained_twin.network
+    closed, random = network.next_closed_form, generator(4, "where")
+    samples = random.normal(size=(30, len(CHANNELS)))
+    response = StepResponse.of(trained_twin).at(samples)
+    features = network.state_features
+    assert response.shape == (closed.lags + 1, 30, len(features), len(features))
+    now, small = 29, 1e-4
+    context = torch.from_numpy(samples[None, now - SPEC.context_steps : now])
+    forecast = design(context, closed.lags) @ closed.weights.double()
+    for age in range(closed.lags + 1):
+        for column, feature in enumerate(features):
             shifted = context.clone()
-            shifted[:, SPEC.context_steps - since :, feature] += 1.0
-            left = -(closed(shifted) - closed(context))[0].numpy()
+            shifted[:, SPEC.context_steps - age :, feature] += small
+            moved = design(shifted, closed.lags) @ closed.weights.double() - forecast
+            left = -moved[0].numpy() / small
             left[column] += 1.0
-            np.testing.assert_allclose(response[since, :, column], left, atol=1e-6)
-    np.testing.assert_array_equal(response, step_response(trained_twin))
+            np.testing.assert_allclose(response[age, now, :, column], left, atol=1e-3)
 
 
 def fitted_score(states: int = 2) -> InnovationScore:
     runs = [generator(4, "runs").normal(size=(500, states)) @ [[1.0, 0.5], [0.0, 0.3]]]
     return InnovationScore.fit(runs, None, InnovationSteps(4, 3, 2, 0.0))
+
+
+def straight(*ages: list[list[float]]) -> StepResponse:
+    """Return the response of a closed form of two states without products and squares."""
+    return StepResponse(np.array(ages), np.zeros((2, 2, 2)), np.zeros((2, 2)), (0, 1))
 
 
 def taken_away(innovations, signature, precision):
@@ -206,55 +218,60 @@ def taken_away(innovations, signature, precision):
     return np.einsum("tf,fg,tg->", innovations, precision, innovations) - distances.min()
 
 
-def test_blame_is_what_the_best_fault_of_a_state_takes_off_the_mean_and_the_onset():
-    score = fitted_score()
-    innovations = generator(4, "lean").normal(size=(12, 2)) * 0.05 + [2.0, 0.1]
-    response = np.array([np.eye(2), [[0.7, 0.2], [0.0, 0.9]], [[0.5, 0.1], [0.0, 0.8]]])
+def test_blame_is_what_the_best_shift_or_noise_of_a_state_explains():
+    score, precision = fitted_score(), fitted_score().size.precision
+    ages = [np.eye(2), np.array([[0.7, 0.2], [0.0, 0.9]]), np.array([[0.5, 0.1], [0.0, 0.8]])]
     directions = np.broadcast_to([[1.0, 0.0], [0.0, 2.0]], (12, 2, 2))
-    found = Signatures(score, response).blame(innovations, np.array([9]), directions)[0]
-    # What stands out is drawn in before the mean is taken, as in the score.
-    mean = score.mean.limit.of(innovations)[6:10].mean(axis=0, keepdims=True)
-    assert not np.allclose(mean, innovations[6:10].mean(axis=0), rtol=0.1)
-    for state, direction in enumerate(directions[0]):
-        lean = [
-            taken_away(mean, (end @ direction)[None], score.mean.precision)
-            for end in (response[0], response[-1])
-        ]
+    for stream, push, wanted in (("lean", [2.0, 0.1], "shift"), ("loud", [0.0, 0.0], "noise")):
+        innovations = generator(4, stream).normal(size=(12, 2)) * (0.05 if push[0] else 2.0) + push
         # The alarm began with the run: any of its samples may be the onset.
-        steps = [
-            taken_away(
-                innovations[at : min(at + 3, 10)],
-                (response @ direction)[: 10 - at],
-                score.size.precision,
-            )
-            for at in range(10)
-        ]
-        assert found[state] == pytest.approx(np.sqrt(max(lean) + max(steps)), rel=1e-5)
+        signatures = Signatures(score, straight(*ages))
+        samples, windows = np.zeros((12, 2)), np.array([9])
+        found = signatures.blame(innovations, samples, windows, directions)[0]
+        best = set()
+        for state, direction in enumerate(directions[0]):
+            shifts = [
+                taken_away(
+                    innovations[onset:10],
+                    np.array([ages[min(age, 2)] @ direction for age in range(10 - onset)]),
+                    precision,
+                )
+                for onset in range(10)
+            ]
+            along = (innovations @ precision @ direction) ** 2 / (direction @ precision @ direction)
+            noises = []
+            for onset in range(9):
+                variance = max(1.0, along[onset:10].mean())
+                noises.append((10 - onset) * (variance - 1 - np.log(variance)))
+            best.add("shift" if max(shifts) > max(noises) else "noise")
+            assert found[state] == pytest.approx(np.sqrt(max(*shifts, *noises)), rel=1e-4)
+        assert wanted in best
 
 
 def test_the_onset_is_remembered_as_long_as_the_alarm_lasts_and_no_longer():
     """What stays is the same for both states; the first sample is not."""
-    score = fitted_score()
-    response = np.array([np.eye(2), *[[[1.0, 1.0], [1.0, 1.0]]] * 2])
+    stays = [[1.0, 1.0], [1.0, 1.0]]
     directions = np.broadcast_to(np.eye(2), (60, 2, 2))
     innovations = generator(4, "quiet").normal(size=(60, 2)) @ [[1.0, 0.5], [0.0, 0.3]] * 0.1
     innovations[20] += [0.0, 6.0]
     innovations[21:40] += [6.0, 6.0]
-    signatures = Signatures(score, response)
-    during = signatures.blame(innovations, np.array([24, 30, 39]), directions)
-    assert (during[:, 1] > 1.1 * during[:, 0]).all()
-    assert signatures.blame(innovations, np.array([58]), directions).max() < during.max() / 10
+    signatures, samples = Signatures(fitted_score(), straight(np.eye(2), stays)), np.zeros((60, 2))
+    during = signatures.blame(innovations, samples, np.array([24, 30, 39]), directions)
+    assert (during[:, 1] > 1.01 * during[:, 0]).all()
+    after = signatures.blame(innovations, samples, np.array([58]), directions)
+    assert after.max() < during.max() / 10
 
 
 def test_blame_knows_nothing_of_what_comes_later():
-    score, windows = fitted_score(), np.arange(4, 20)
-    signatures = Signatures(score, np.array([np.eye(2)] * 4) * 0.5)
+    windows = np.arange(4, 20)
+    signatures = Signatures(fitted_score(), straight(np.eye(2), 0.5 * np.eye(2)))
     innovations = generator(4, "later").normal(size=(40, 2))
-    directions = np.broadcast_to(np.eye(2), (40, 2, 2))
-    whole = signatures.blame(innovations, windows, directions)
+    samples, directions = np.zeros((40, 2)), np.broadcast_to(np.eye(2), (40, 2, 2))
+    whole = signatures.blame(innovations, samples, windows, directions)
     innovations[20:] += 100.0
-    np.testing.assert_array_equal(signatures.blame(innovations, windows, directions), whole)
-    cut = signatures.blame(innovations[:20], windows, directions[:20])
+    again = signatures.blame(innovations, samples, windows, directions)
+    np.testing.assert_array_equal(again, whole)
+    cut = signatures.blame(innovations[:20], samples[:20], windows, directions[:20])
     np.testing.assert_allclose(cut, whole)
 
 
@@ -263,9 +280,9 @@ def test_the_onset_is_sought_as_far_back_as_either_statistic_looks():
     score = InnovationScore.fit(runs, None, InnovationSteps(2, 20, 2, 0.0))
     innovations = generator(4, "calm").normal(size=(60, 2)) * 0.1
     innovations[30] += [0.0, 8.0]
-    signatures = Signatures(score, np.array([np.eye(2)] * 3))
+    signatures = Signatures(score, straight(np.eye(2), np.zeros((2, 2))))
     directions = np.broadcast_to(np.eye(2), (60, 2, 2))
-    found = signatures.blame(innovations, np.array([49, 59]), directions)
+    found = signatures.blame(innovations, np.zeros((60, 2)), np.array([49, 59]), directions)
     assert found[0, 1] > 4
     assert found[1].max() < 1
 

@@ -72,6 +72,10 @@ def case_values() -> dict[str, Any]:
             "block_s": None,
             "block_gap_s": None,
         },
+        "score": {
+            part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
+            for part in ("innovation", "consistency")
+        },
         "persistence_s": 2.0,
         "short_lead_s": 1.0,
         "guard_start_s": 10.0,

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 SETUPS = ("vessel-all", "vessel-random")
-DETECTORS = ("odisar", "closed-form", "reconstruction", "rmse", "mahalanobis", "oracle")
+DETECTORS = ("odisar", "without-transformer", "reconstruction", "rmse", "mahalanobis", "oracle")
 #: Those that can be deployed; the last is judged as the monitor alone.
 DEPLOYED = DETECTORS[:-1]
 STRENGTHS = (0.25, 1.0)

@@ -24,7 +24,7 @@ def test_the_published_monitor_stands_beside_ours_and_beside_the_papers_score(re
 def test_forecast_errors_stand_beside_the_scores_with_their_published_values(results):
     table = answers.against_forecast_errors(results, "vessel-all")
     assert cells(table, "overall", "forecast RMSE")[-1] == "90.0 / 90.0 / 90.0 / 90.0"
-    assert cells(table, "overall", "closed form alone")[-1] == ""
+    assert cells(table, "overall", "ODiSAR without Transformer")[-1] == ""
 
 
 def test_without_published_values_there_is_no_column_for_them(results):
@@ -45,7 +45,7 @@ def test_every_rule_is_told_with_its_promise_and_what_it_gave(results):
     assert row[3:7] == ["1", "0.5 [0.2, 0.9]", "8", "25.0"]
     assert cells(own, "ODiSAR", "mean + k sigma (the paper's)")[3] == "-"
     assert "per block of time, not per hour" in own.note
-    assert {row[0] for row in others.rows} >= {"closed form alone", "forecast RMSE"}
+    assert {row[0] for row in others.rows} >= {"ODiSAR without Transformer", "forecast RMSE"}
 
 
 def test_reliability_is_told_before_and_after_recalibration(results):
@@ -62,7 +62,7 @@ def test_reliability_is_told_before_and_after_recalibration(results):
 def test_pairs_carry_their_sign_and_the_best_other_detector_a_star(results):
     change_pair(results, "rmse", "delay_p50_s", np.nan, np.nan, np.nan)
     table = answers.pairs(results, "vessel-all")
-    assert cells(table, "closed form alone", "0.25")[2] == "+4.00 * [+3.00, +5.00]"
+    assert cells(table, "ODiSAR without Transformer", "0.25")[2] == "+4.00 * [+3.00, +5.00]"
     assert cells(table, "forecast RMSE", "1")[-1] == "-"
 
 

@@ -45,7 +45,7 @@ def test_a_difference_whose_interval_includes_zero_is_said_to_be_no_more(results
 
 def test_the_first_sentence_says_where_the_transformer_adds_and_where_nothing(results):
     first = summarise(results).gains[0]
-    assert first.startswith("vessel-all: what the Transformer adds to its closed form alone")
+    assert first.startswith("vessel-all: what the Transformer adds to closed form and consistency")
     assert "something in AUROC (+4.00 [+3.00, +5.00] points at strength 0.25)" in first
     assert "the median delay (-0.04 [-0.05, -0.03] s at strength 0.25)" in first
     assert "no difference beyond the 95 % interval in AUROC (at strength 1)" in first
@@ -53,14 +53,14 @@ def test_the_first_sentence_says_where_the_transformer_adds_and_where_nothing(re
 
 
 def test_harm_of_the_transformer_is_called_that(results):
-    change_pair(results, "closed-form", "f1_ood", -0.02, -0.03, -0.01)
+    change_pair(results, "without-transformer", "f1_ood", -0.02, -0.03, -0.01)
     assert (
         "it harms F1 OOD (at strengths 0.25, 1; at most -2.00 [-3.00, -1.00] points at strength"
     ) in summarise(results).gains[0]
 
 
 def test_a_gain_without_an_interval_is_left_open(results):
-    change_pair(results, "closed-form", "auroc", 0.02, np.nan, np.nan)
+    change_pair(results, "without-transformer", "auroc", 0.02, np.nan, np.nan)
     assert (
         "too few recordings for an interval in AUROC (at strengths 0.25, 1)"
         in (summarise(results).gains[0])
@@ -74,7 +74,7 @@ def test_alarms_are_told_with_the_hours_in_which_false_ones_were_counted(results
 
 def test_the_best_other_detector_is_named(results):
     found = " ".join(summarise(results).found["vessel-all"])
-    assert "best other detector: closed form alone +4.00 [+3.00, +5.00] points at" in found
+    assert "best other detector: ODiSAR without Transformer +4.00 [+3.00, +5.00] points at" in found
 
 
 def test_an_interval_that_includes_one_half_is_called_a_coin(results):

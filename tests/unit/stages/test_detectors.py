@@ -1,5 +1,6 @@
 """All detectors of a member speak of the same samples, and none learns from what it judges."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,10 +9,15 @@ import pytest
 from odisar.baselines.range_rule import range_rule_scores
 from odisar.capability.scoring import DETECTORS, RecordingScores, Scorer
 from odisar.config.cases import RangeRule
-from odisar.config.judging import InnovationConfig
 from odisar.config.loader import load_config
+from odisar.config.score import ScoreConfig, StatisticsConfig
 from odisar.recordings.schema import Recording, RecordingInfo
-from odisar.stages.detectors import MemberDetectors, fit_innovation_scores, member_reference
+from odisar.stages.detectors import (
+    MemberDetectors,
+    fit_innovation_scores,
+    fit_relations,
+    member_reference,
+)
 from odisar.stages.members import MemberData
 from small_bundle import small_case
 from small_innovations import small_scorer
@@ -50,7 +56,7 @@ def asked_of(positions, scores):
     """Return a scorer that knows these scores alone."""
     unknown = np.zeros((len(positions), 1))
     runs = ((0, len(positions)),)
-    known = RecordingScores(positions, scores, unknown, unknown, unknown, runs)
+    known = RecordingScores(positions, scores, unknown, unknown, unknown, unknown, runs)
     return SimpleNamespace(score=lambda *_, **__: known)
 
 
@@ -111,8 +117,13 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     data, trained_twin
 ):
     scorer = Scorer(trained_twin, 64, "cpu")
-    config = InnovationConfig(mean_steps=7, size_steps=3, recent_steps=2, recent_share=0.2)
-    fitted = fit_innovation_scores(scorer, data, config)
+    own = StatisticsConfig(mean_steps=7, size_steps=3, recent_steps=2, recent_share=0.2)
+    tied = StatisticsConfig(mean_steps=4, size_steps=5, recent_steps=1, recent_share=0.4)
+    score = ScoreConfig(innovation=own, consistency=tied)
+    case = data.case.model_copy(update={"score": score})
+    fitted = fit_innovation_scores(scorer, replace(data, case=case))
+    assert (fitted.consistency.mean.steps, fitted.consistency.size.steps) == (4, 5)
+    assert fitted.consistency.reconstruction is None
     assert (fitted.twin.mean.steps, fitted.closed_form.size.steps) == (7, 3)
     assert (fitted.twin.recent.steps, fitted.closed_form.recent_share) == (2, 0.2)
     assert fitted.twin.reconstruction is not None
@@ -123,3 +134,12 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     moment = sum(run.T @ run for run in validation) / sum(map(len, validation))
     np.testing.assert_allclose(fitted.twin.size.precision, np.linalg.inv(moment), rtol=1e-4)
     assert not np.allclose(fitted.twin.size.precision, fitted.closed_form.size.precision, rtol=1e-3)
+
+
+def test_relations_are_fitted_on_training_recordings(data, trained_twin):
+    relations = fit_relations(data, trained_twin)
+    others = replace(data, splits={**data.splits, "train": data.splits["validation"]})
+    assert relations.states == trained_twin.network.state_features
+    assert not np.allclose(relations.weights, fit_relations(others, trained_twin).weights)
+    later = replace(data, splits={"train": data.splits["train"]})
+    np.testing.assert_array_equal(relations.weights, fit_relations(later, trained_twin).weights)

@@ -3,6 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from odisar.capability.consistency import Consistency
 from odisar.capability.distribution import NoiseFloor
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.innovations import InnovationScore, InnovationSteps
@@ -31,7 +32,8 @@ def config(request):
 def innovation_values() -> InnovationScoreValues:
     runs = [np.random.default_rng(0).normal(size=(50, 2))]
     score = InnovationScore.fit(runs, None, InnovationSteps(3, 2, 1, 0.3))
-    return InnovationScoreValues.of(InnovationScores(score, score))
+    relations = Consistency.fit(np.concatenate(runs), (0,))
+    return InnovationScoreValues.of(InnovationScores(score, score, score, relations))
 
 
 def calibration(number: int, *, hours: float, sigma: float = 1.0) -> MemberCalibration:

@@ -8,7 +8,8 @@ import pytest
 
 from odisar.capability.scoring import Scorer
 from odisar.stages.members import MemberData
-from odisar.study.development import candidates, fit_statistics, ranked
+from odisar.study.candidates import candidates
+from odisar.study.development import fit_statistics, ranked
 from small_bundle import small_case
 from small_system import make_recording
 
@@ -21,7 +22,7 @@ def judged(*rows):
     return pd.DataFrame(rows, columns=["candidate", "setup", "auroc", "tnr_at_tpr95"])
 
 
-def test_the_mean_is_over_set_ups_of_the_mean_over_cells():
+def test_the_mean_is_over_the_cells_of_a_set_up_and_ranks_are_its_own():
     table = ranked(
         judged(
             ("wide", "x", 0.8, 0.6),
@@ -32,11 +33,10 @@ def test_the_mean_is_over_set_ups_of_the_mean_over_cells():
             ("even", "y", 0.9, 0.7),
         )
     )
-    # Over cells alone, `wide` would have .67 and `even` .6.
-    means = table.groupby("candidate").rule_mean.first()
-    assert means["wide"] == pytest.approx((0.8 + 0.4) / 2)
-    assert means["even"] == pytest.approx((0.5 + 0.8) / 2)
-    assert table["rank"].tolist() == [2, 2, 2, 1, 1, 1]
+    means = table.groupby(["setup", "candidate"]).rule_mean.first()
+    assert means["x"].to_dict() == pytest.approx({"wide": 0.8, "even": 0.5})
+    assert means["y"].to_dict() == pytest.approx({"wide": 0.4, "even": 0.8})
+    assert table["rank"].tolist() == [1, 1, 2, 2, 2, 1]
     assert table.candidate.tolist() == ["wide"] * 3 + ["even"] * 3
 
 
@@ -88,6 +88,23 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
             # (9.9 + .7 * 6 + .3 * 4) / 2 and so on.
             [7.65, 7.6, 8.3],
         ),
+        (
+            (
+                "largest of limited mean over 20, size of one state over 3, reconstruction; "
+                "recent mean over 5 (.7, .3); mean with closed form and consistency (size over 10)"
+            ),
+            10,
+            # (9.9 + 5.4 + .6 * 9 + .4 * 1) / 3 and so on.
+            [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0],
+        ),
+        (
+            (
+                "no twin: closed form's limited mean over 20, size of one state over 3; "
+                "recent mean over 5 (.7, .3); mean with consistency (size over 10)"
+            ),
+            6,
+            [5.6, 5.6, 7.4],
+        ),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -101,6 +118,9 @@ def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
         "closed form's T2 of limited mean over 20": np.array([6.0, 1.0, 2.0]),
         "closed form's size of one state over 3": np.array([3.0, 8.0, 8.0]),
         "closed form's T2 of mean over 5": np.array([4.0, 32 / 3, 32 / 3]),
+        "parity residuals' T2 of limited mean over 10": np.array([9.0, 2.0, 0.0]),
+        "parity residuals' size of one state over 10": np.array([3.0, 4.0, 10.0]),
+        "parity residuals' T2 of mean over 1": np.array([1.0, 0.0, 0.0]),
         "size of one state over 3": np.array([12.0, 1.0, 1.0]),
         "size of one state over 10": np.array([4.0, 1.0, 1.0]),
     }
@@ -142,7 +162,8 @@ def test_every_statistic_is_made_and_none_knows_what_comes_later(relative_twin):
 
 
 def test_statistics_of_the_closed_form_are_of_its_innovations(trained_twin):
-    data = MemberData(small_case(), {"train": []}, trained_twin.scaler, trained_twin.spec)
+    splits = {"train": [make_recording("train-0")]}
+    data = MemberData(small_case(), splits, trained_twin.scaler, trained_twin.spec)
     scorer = Scorer(trained_twin, 64, "cpu")
     held_out = [
         (item, scorer.score(item, short_lead_steps=3))
@@ -161,3 +182,7 @@ def test_statistics_of_the_closed_form_are_of_its_innovations(trained_twin):
         np.testing.assert_array_equal(closed(item, scores), moved)
         assert not np.allclose(own(item, scores), closed(item, scores), equal_nan=True)
         assert not np.allclose(closed(item, scores), closed(item, swapped), equal_nan=True)
+        tied = makers[f"parity residuals' {name}"]
+        np.testing.assert_array_equal(tied(item, scores), tied(item, swapped))
+        shifted = replace(scores, samples=scores.samples + np.float32([0, 1, 0]))
+        assert not np.allclose(tied(item, scores), tied(item, shifted), equal_nan=True)

@@ -1,0 +1,133 @@
+"""The scores to choose from: statistics of innovations and parity residuals, put together."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from odisar.capability.innovations import FloatArray
+from odisar.capability.scoring import RECONSTRUCTION
+
+#: Steps of the windows that are tried, and leads of forecasts that are compared with now.
+WINDOWS, LEADS = (1, 3, 5, 10, 20), (5, 10)
+WEIGHTS, SIZES, LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
+#: Of the few last innovations, and of the sizes of parity residuals, that are offered.
+RECENT, _TIED_SIZES = (1, 3, 5), (3, 10)
+
+#: Before the name of a statistic of the closed form's innovations, of parity residuals.
+CLOSED, PARITY = "closed form's ", "parity residuals' "
+
+#: (time,) statistics of one recording by name, on their log scale.
+Statistics = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those."""
+
+    name: str
+    parts: int
+    of: Callable[[Statistics], FloatArray]
+
+
+def candidates() -> list[Candidate]:
+    """Return every candidate, in the order of the table."""
+    singles = [f"T2 of mean over {k}" for k in WINDOWS]
+    singles += [f"T2 of limited mean over {k}" for k in LIMITED]
+    singles += [f"T2 of exponential mean, weight {a:g}" for a in WEIGHTS]
+    singles += [f"log NIS over {k}" for k in SIZES] + ["log NIS over 5, by regime"]
+    singles += [f"size of one state over {k}" for k in SIZES]
+    singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in LEADS]
+    singles += [RECONSTRUCTION]
+    singles += [f"{source}{name}" for source in (CLOSED, PARITY) for name in of_limited()]
+    made = [Candidate(name, 1, lambda s, n=name: s[n]) for name in singles]  # type: ignore[misc]
+    for label, size in (("", "log NIS over 5"), (" of one state", "size of one state over 10")):
+        made += _combined(label, "T2 of mean over 10", size)
+    return made + [
+        one
+        for steps in LIMITED
+        for size in SIZES
+        for recent in RECENT[1:]
+        for one in _limited(steps, size, recent)
+    ]
+
+
+def of_limited() -> list[str]:
+    """Return the statistics that candidates with a limited mean are made of, of each source."""
+    means = [f"T2 of limited mean over {k}" for k in LIMITED]
+    sizes = [f"size of one state over {k}" for k in SIZES]
+    return [*means, *sizes, *(f"T2 of mean over {k}" for k in RECENT)]
+
+
+def _limited(steps: int, size: int, last: int) -> list[Candidate]:
+    """Return the largest of three, of a mean that single innovations can't rule.
+
+    Alone, averaged with what the innovations of the closed form say, and with what parity residuals
+    say as well; last the same without the twin, which is no candidate for a twin's default.
+    """
+    two = (f"T2 of limited mean over {steps}", f"size of one state over {size}")
+    recent = f"T2 of mean over {last}"
+    name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
+    name += f"; recent mean over {last} (.7, .3)"
+
+    def alone(s: Statistics) -> FloatArray:
+        return 0.7 * _largest(s, (*two, RECONSTRUCTION)) + 0.3 * s[recent]
+
+    def closed(s: Statistics) -> FloatArray:
+        lasting = _largest(s, tuple(f"{CLOSED}{name}" for name in two))
+        return 0.7 * lasting + 0.3 * s[f"{CLOSED}{recent}"]
+
+    made = [
+        Candidate(name, 4, alone),
+        Candidate(f"{name}; mean with closed form", 7, lambda s: (alone(s) + closed(s)) / 2),
+    ]
+    for tied_size in _TIED_SIZES:
+        tied = _tied(tied_size)
+        label = f"consistency (size over {tied_size})"
+        made += [
+            Candidate(
+                f"{name}; mean with closed form and {label}",
+                10,
+                lambda s, tied=tied: (alone(s) + closed(s) + tied(s)) / 3,  # type: ignore[misc]
+            ),
+            Candidate(
+                f"no twin: closed form's limited mean over {steps}, size of one state over {size}; "
+                f"recent mean over {last} (.7, .3); mean with {label}",
+                6,
+                lambda s, tied=tied: (closed(s) + tied(s)) / 2,  # type: ignore[misc]
+            ),
+        ]
+    return made
+
+
+def _tied(size: int) -> Callable[[Statistics], FloatArray]:
+    """Return what parity residuals say: no sample before the last is in one, so one is recent."""
+    lasting = (f"{PARITY}T2 of limited mean over 10", f"{PARITY}size of one state over {size}")
+    recent = f"{PARITY}T2 of mean over 1"
+    return lambda s: 0.6 * _largest(s, lasting) + 0.4 * s[recent]
+
+
+def _combined(label: str, mean: str, size: str) -> list[Candidate]:
+    """Return candidates that take the largest of several statistics, without and with recent ones.
+
+    Recent ones let go sooner when a disturbance has ended.
+    """
+    both, three = (mean, size), (mean, size, RECONSTRUCTION)
+    recent = ("T2 of mean over 3",)
+    sizes = ("T2 of mean over 3", "size of one state over 3")
+    name = f"largest of mean, size{label}, reconstruction"
+
+    def mixed(share: float, last: tuple[str, ...]) -> Callable[[Statistics], FloatArray]:
+        return lambda s: (1 - share) * _largest(s, three) + share * _largest(s, last)
+
+    return [
+        Candidate(f"larger of mean and size{label}", 2, lambda s: _largest(s, both)),
+        Candidate(name, 3, lambda s: _largest(s, three)),
+        Candidate(f"{name}; recent mean (.7, .3)", 4, mixed(0.3, recent)),
+        Candidate(f"{name}; recent mean (.5, .5)", 4, mixed(0.5, recent)),
+        Candidate(f"{name}; larger recent (.7, .3)", 5, mixed(0.3, sizes)),
+    ]
+
+
+def _largest(statistics: Statistics, names: tuple[str, ...]) -> FloatArray:
+    return np.asarray(np.max([statistics[name] for name in names], axis=0))
