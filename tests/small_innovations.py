@@ -34,6 +34,7 @@ def fit_small_scores(twin: TrainedTwin) -> InnovationScores:
         InnovationScore.fit(closed, None, STEPS),
         InnovationScore.fit(tied, None, TIED),
         relations,
+        1.0,
     )
 
 

@@ -157,6 +157,7 @@ def analytic_scores() -> InnovationScores:
         InnovationScore(mean, size, recent, 0.3, None),
         InnovationScore(mean, size, recent, 0.4, None),
         analytic_relations(),
+        0.5,
     )
 
 

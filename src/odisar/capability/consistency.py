@@ -23,6 +23,8 @@ from odisar.forecasters.closed_form import design, design_width
 _RIDGE = 1.0e-6
 
 
+#: A relation holds if it explains this share of a state's variance on held-out recordings.
+_HOLDS = 0.5
 #: Samples whose products are summed at a time; a matter of memory, not of results.
 _CHUNK = 4096
 
@@ -71,6 +73,16 @@ class Consistency:
         """
         values = samples.astype(np.float64)
         return np.asarray(values[:, list(self.states)] - _regressors(values) @ self.weights.T)
+
+    def share_holding(self, samples: NDArray[np.floating]) -> float:
+        """Return the share of states whose relation holds on (time, feature) scaled samples.
+
+        It holds if it explains at least half of the state's variance there. On recordings that it
+        wasn't fitted to, one that has learnt too much from too little doesn't.
+        """
+        known = samples[np.isfinite(samples).all(axis=1)].astype(np.float64)
+        left = np.mean(self.residuals(known) ** 2, axis=0)
+        return float(np.mean(left <= (1 - _HOLDS) * known[:, list(self.states)].var(axis=0)))
 
 
 def _regressors(samples: FloatArray) -> FloatArray:

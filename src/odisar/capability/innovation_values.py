@@ -119,6 +119,7 @@ class InnovationScoreValues(Section):
     closed_form: InnovationValues
     consistency: InnovationValues
     relations: RelationValues
+    share_holding: Annotated[float, Field(ge=0, le=1)]
 
     @classmethod
     def of(cls, scores: InnovationScores) -> Self:
@@ -130,6 +131,7 @@ class InnovationScoreValues(Section):
             relations=RelationValues(
                 states=list(scores.relations.states), weights=scores.relations.weights.tolist()
             ),
+            share_holding=scores.share_holding,
         )
 
     def build(self) -> InnovationScores:
@@ -140,6 +142,7 @@ class InnovationScoreValues(Section):
             self.closed_form.build(),
             self.consistency.build(),
             Consistency(tuple(tied.states), np.array(tied.weights)),
+            self.share_holding,
         )
 
     @property

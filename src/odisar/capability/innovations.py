@@ -202,11 +202,12 @@ class InnovationSteps:
 class InnovationScore:
     """A score of innovations, as exp of a weighted sum of statistics on their common log scale.
 
+    What it says of innovations holds of parity residuals as well (``consistency``).
     The largest of T2 of the mean innovation, the size of the innovations of the state that scatters
     most and, where there is one, the reconstruction error of the forecast (``reconstruction`` is
     its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
     mean of very few innovations, which lets go as soon as a disturbance has ended. 1 is what is
-    usual on held-out recordings, e = 2.7 what is rare. The monitor's is made of two of these (see
+    usual on held-out recordings, e = 2.7 what is rare. The monitor's is made of three of these (see
     ``scoring.InnovationScores``).
     """
 

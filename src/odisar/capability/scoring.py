@@ -48,12 +48,15 @@ class InnovationScores:
     Transformer where it has learnt too little or what it shouldn't, the closed form where things
     are not linear, both where a fault has been in their past for a while, and the ``relations``
     within a sample, whose residuals ``consistency`` judges, wherever only time would tell.
+    The last one's weight is the share of states whose relation holds (``share_holding``), 1 where
+    all do as the weight of the others.
     """
 
     twin: InnovationScore
     closed_form: InnovationScore
     consistency: InnovationScore
     relations: Consistency
+    share_holding: float
 
     @property
     def known_after_steps(self) -> int:
@@ -77,16 +80,17 @@ class InnovationScores:
         closed = self.closed_form.score(closed_form, reconstruction)
         tied = self.consistency.score(self.relations.residuals(samples), reconstruction)
         made = {
-            ODISAR: _geometric_mean(twin, closed, tied),
-            WITHOUT_TRANSFORMER: _geometric_mean(closed, tied),
+            ODISAR: _geometric_mean((twin, 1.0), (closed, 1.0), (tied, self.share_holding)),
+            WITHOUT_TRANSFORMER: _geometric_mean((closed, 1.0), (tied, self.share_holding)),
             CLOSED_FORM: closed,
             CONSISTENCY: tied,
         }
         return {name: scores.astype(np.float32) for name, scores in made.items()}
 
 
-def _geometric_mean(*scores: FloatArray) -> FloatArray:
-    return np.asarray(np.exp(np.mean(np.log(scores), axis=0)))
+def _geometric_mean(*weighed: tuple[FloatArray, float]) -> FloatArray:
+    logs = sum(weight * np.log(scores) for scores, weight in weighed)
+    return np.asarray(np.exp(logs / sum(weight for _, weight in weighed)))
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,7 @@ def fit_innovation_scores(scorer: Scorer, data: MemberData) -> InnovationScores:
         InnovationScore.fit([s.closed_form_innovations[at] for s, at in runs], None, steps),
         InnovationScore.fit([relations.residuals(s.samples[at]) for s, at in runs], None, tied),
         relations,
+        relations.share_holding(np.concatenate([s.samples for s in found])),
     )
 
 

@@ -91,3 +91,21 @@ def test_too_few_samples_are_refused_with_both_numbers():
     needed = design_width(3, 1)
     with pytest.raises(OdisarError, match=f"{needed} training samples cannot give the {needed}"):
         Consistency.fit(tied_samples("few", needed), (1, 2))
+
+
+def test_a_relation_that_explains_less_than_half_of_fresh_samples_does_not_hold(relations):
+    fresh = tied_samples("fresh")
+    assert relations.share_holding(fresh) == 1.0
+    others = fresh.copy()
+    others[:, 2] = generator(7, "apart").normal(size=len(fresh))
+    assert relations.share_holding(others) == 0.0
+    halves = np.concatenate([fresh, np.full((3, 3), np.nan, dtype=np.float32)])
+    assert relations.share_holding(halves) == 1.0
+
+
+def test_relations_learnt_from_too_little_do_not_hold():
+    few, fresh = (generator(7, name).normal(size=(40, 5)) for name in ("little", "more"))
+    few[:, 4] += few[:, 0]
+    fresh[:, 4] += fresh[:, 0]
+    relations = Consistency.fit(few, (3, 4))
+    assert relations.share_holding(few) > relations.share_holding(fresh)

@@ -15,7 +15,7 @@ from odisar.capability.scoring import InnovationScores
 from odisar.seeding import generator
 
 
-def fitted(states: int = 2) -> InnovationScores:
+def fitted(states: int = 2, share_holding: float = 0.5) -> InnovationScores:
     random = generator(5, "values")
     steps = InnovationSteps(mean=6, size=4, recent=2, recent_share=0.25)
     runs, rebuilt = [random.normal(size=(200, states))], [np.exp(random.normal(size=200))]
@@ -28,6 +28,7 @@ def fitted(states: int = 2) -> InnovationScores:
         InnovationScore.fit(runs, None, steps),
         InnovationScore.fit([relations.residuals(samples)], None, replace(steps, mean=8)),
         relations,
+        share_holding,
     )
 
 
@@ -107,6 +108,13 @@ def test_what_can_be_no_score_is_refused(content, place, value, complaint):
         InnovationScoreValues.model_validate(spoilt)
 
 
+@pytest.mark.parametrize("share", [-0.1, 1.1, None])
+def test_a_share_is_between_none_and_all(content, share):
+    content["share_holding"] = share
+    with pytest.raises(ValidationError, match="share_holding"):
+        InnovationScoreValues.model_validate(content)
+
+
 @pytest.mark.parametrize("key", ["mean", "size", "recent", "recent_share", "reconstruction"])
 def test_a_part_that_is_missing_is_named(content, key):
     del content["closed_form"][key]
@@ -114,13 +122,19 @@ def test_a_part_that_is_missing_is_named(content, key):
         InnovationScoreValues.model_validate(content)
 
 
-def test_the_monitors_score_is_the_geometric_mean_of_its_three_parts():
-    scores, seen = fitted(), fresh("both")
-    found = scores.of(*seen)
+@pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
+def test_the_monitors_score_is_the_weighed_geometric_mean_of_its_three_parts(share):
+    scores, seen = fitted(share_holding=share), fresh("both")
+    found = {name: part.astype(np.float64) for name, part in scores.of(*seen).items()}
     twin = scores.twin.score(seen[0], seen[-1])
     closed, tied = found["closed-form"], found["consistency"]
-    np.testing.assert_allclose(found["odisar"] ** 3, twin * closed * tied, rtol=1e-5)
-    np.testing.assert_allclose(found["without-transformer"] ** 2, closed * tied, rtol=1e-5)
+    # Before all parts are known none is weighed.
+    since = scores.known_after_steps
+    assert np.isnan(found["odisar"][: since - 1]).all()
+    whole = (twin * closed * tied**share) ** (1 / (2 + share))
+    np.testing.assert_allclose(found["odisar"][since:], whole[since:], rtol=1e-5)
+    wanted = (closed * tied**share) ** (1 / (1 + share))
+    np.testing.assert_allclose(found["without-transformer"][since:], wanted[since:], rtol=1e-5)
     residuals = scores.relations.residuals(seen[2])
     np.testing.assert_allclose(tied, scores.consistency.score(residuals, seen[-1]), rtol=1e-5)
 

@@ -120,7 +120,7 @@ def drive_scorer(plan):
     runs = [run for scores in scored for run in runs_of(scores, scores.innovations)]
     score = InnovationScore.fit(runs, None, STEPS)
     relations = Consistency.fit(scored[0].samples, twin.network.state_features)
-    return Scorer(twin, 64, "cpu", InnovationScores(score, score, score, relations))
+    return Scorer(twin, 64, "cpu", InnovationScores(score, score, score, relations, 1.0))
 
 
 def turned(drive: Recording, angle: float) -> Recording:

@@ -124,6 +124,10 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     fitted = fit_innovation_scores(scorer, replace(data, case=case))
     assert (fitted.consistency.mean.steps, fitted.consistency.size.steps) == (4, 5)
     assert fitted.consistency.reconstruction is None
+    held_out = [
+        scorer.score(item, short_lead_steps=3).samples for item in data.splits["validation"]
+    ]
+    assert fitted.share_holding == fitted.relations.share_holding(np.concatenate(held_out))
     assert (fitted.twin.mean.steps, fitted.closed_form.size.steps) == (7, 3)
     assert (fitted.twin.recent.steps, fitted.closed_form.recent_share) == (2, 0.2)
     assert fitted.twin.reconstruction is not None

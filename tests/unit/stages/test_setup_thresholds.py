@@ -33,7 +33,7 @@ def innovation_values() -> InnovationScoreValues:
     runs = [np.random.default_rng(0).normal(size=(50, 2))]
     score = InnovationScore.fit(runs, None, InnovationSteps(3, 2, 1, 0.3))
     relations = Consistency.fit(np.concatenate(runs), (0,))
-    return InnovationScoreValues.of(InnovationScores(score, score, score, relations))
+    return InnovationScoreValues.of(InnovationScores(score, score, score, relations, 1.0))
 
 
 def calibration(number: int, *, hours: float, sigma: float = 1.0) -> MemberCalibration:
