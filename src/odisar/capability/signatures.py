@@ -1,13 +1,13 @@
 """Which state to blame for innovations: the one whose fault would explain most of them.
 
-For every state two kinds of fault are held against the innovations, from any moment at which the
-current alarm may have begun: a shift that lasts, and noise. Each says by a generalised likelihood
-ratio (Willsky and Jones, IEEE Trans. Automatic Control 1976) how much better it explains them than
-no fault does. A shift is sought along its *signature*: in its first sample it shows in its own
-state alone; afterwards forecasts are made from faulty samples, and what shows is the shift less
-what the closed form, linearised where the machine is, carries on of it. What stays can be nearly
-the same for two states that physics ties (a velocity that reads too high, a position that creeps);
-the first sample isn't, and all of them together tell.
+For every state three kinds of fault are held against the innovations, from any moment at which the
+current alarm may have begun: a shift that lasts, a drift, and noise. Each says by a generalised
+likelihood ratio (Willsky and Jones, IEEE Trans. Automatic Control 1976) how much better it explains
+them than no fault does. A shift is sought along its *signature*: in its first sample it shows in
+its own state alone; afterwards forecasts are made from faulty samples, and what shows is the shift
+less what the closed form, linearised where the machine is, carries on of it. What stays can be
+nearly the same for two states that physics ties (a velocity that reads too high, a position that
+creeps); the first sample isn't, and all of them together tell.
 """
 
 from dataclasses import dataclass
@@ -124,7 +124,7 @@ class Signatures:
         ``innovations`` (time, state feature) and ``samples`` (time, feature) are of one gapless
         run, ``windows`` which of its times are asked for, ``directions`` (time, state, state
         feature) those of ``state_directions``. It is the root of twice the log likelihood ratio of
-        the state's better fault, a shift or noise, at the best of its possible onsets.
+        the state's best fault, a shift, a drift or noise, at the best of its possible onsets.
         """
         seen = _Seen.of(self, np.nan_to_num(innovations), samples, directions)
         # What is rare now may have set in when the oldest sample that is looked at came.
@@ -134,7 +134,8 @@ class Signatures:
         found = np.zeros((len(windows), directions.shape[1]))
         for row, window in enumerate(windows):
             first, last = max(0, int(starts[window]) - lead_in), int(window)
-            found[row] = np.maximum(seen.shifts(first, last), seen.noises(first, last))
+            kinds = (seen.shifts, seen.drifts, seen.noises)
+            found[row] = np.max([kind(first, last) for kind in kinds], axis=0)
         return np.sqrt(found)
 
 
@@ -142,15 +143,16 @@ class Signatures:
 class _Seen:
     """A run of innovations against every state's signature, in sums that any onset is read from.
 
-    ``along`` and ``size`` (age, time, state) are the products of a signature of that age with the
-    innovation and with itself, in the metric of single innovations; ``staying`` (2, time + 1,
-    state) sums both over time at the last age, ``fresh`` (time + 1, state) sums squares along the
-    first, in variances.
+    ``shift`` and ``drift`` hold two arrays (age, time, state) each: the products of a signature of
+    that age with the innovation and with itself, in the metric of single innovations. A drift is
+    the sum of the shifts that set in at each of its samples. ``later`` (term, time + 1, state) sums
+    over time what both are made of at greater ages, ``fresh`` (time + 1, state) the squares along
+    the first signature, in variances.
     """
 
-    along: FloatArray
-    size: FloatArray
-    staying: FloatArray
+    shift: tuple[FloatArray, FloatArray]
+    drift: tuple[FloatArray, FloatArray]
+    later: FloatArray
     fresh: FloatArray
 
     @classmethod
@@ -162,28 +164,48 @@ class _Seen:
         directions: FloatArray,
     ) -> "_Seen":
         precision = signatures.score.size.precision
+
+        def product(one: FloatArray, other: FloatArray) -> FloatArray:
+            return np.asarray(np.einsum("...sf,...sf->...s", one @ precision, other))
+
+        seen = innovations[:, None, :]
         shown = np.einsum("tsf,atgf->atsg", directions, signatures.response.at(samples))
-        weighed = shown @ precision
-        along = np.einsum("atsf,tf->ats", weighed, innovations)
-        size = np.einsum("atsf,atsf->ats", weighed, shown)
-        squares = along[0] ** 2 / np.maximum(size[0], _SMALLEST)
-        return cls(along, size, _summed(np.stack([along[-1], size[-1]])), _summed(squares))
+        grown = np.cumsum(shown, axis=0)
+        shift = (product(shown, seen), product(shown, shown))
+        drift = (product(grown, seen), product(grown, grown))
+        both, time = product(grown[-1], shown[-1]), np.arange(len(innovations))[:, None]
+        along, size = shift[0][-1], shift[1][-1]
+        terms = [along, time * along, size, time * size, time**2 * size, both, time * both]
+        terms += [drift[0][-1], drift[1][-1]]
+        squares = shift[0][0] ** 2 / np.maximum(shift[1][0], _SMALLEST)
+        return cls(shift, drift, _summed(np.stack(terms)), _summed(squares))
 
     def shifts(self, first: int, last: int) -> FloatArray:
         """Return (state,) the most that a shift explains which set in from ``first`` to ``last``.
 
         Twice its log likelihood ratio: the square along the signature over the signature's own.
         """
-        onsets = np.arange(first, last + 1)
-        parts = []
-        for values, staying in ((self.along, self.staying[0]), (self.size, self.staying[1])):
-            oldest = len(values) - 1
-            total = staying[last + 1] - staying[np.minimum(onsets + oldest, last + 1)]
-            for age in range(oldest):
-                at = onsets[onsets + age <= last]
-                total[: len(at)] += values[age, at + age]
-            parts.append(total)
-        return np.asarray((parts[0] ** 2 / np.maximum(parts[1], _SMALLEST)).max(axis=0))
+        later = self._later(first, last)
+        return _explained(self.shift, (later[0], later[2]), first, last)
+
+    def drifts(self, first: int, last: int) -> FloatArray:
+        """Return (state,) the most that a drift explains which set in from ``first`` to ``last``.
+
+        At age n, beyond the oldest of the response, its signature is the oldest one's and so many
+        times more what stays of a shift.
+        """
+        along, t_along, size, t_size, tt_size, both, t_both, drifted, own = self._later(first, last)
+        since = (np.arange(first, last + 1) + len(self.shift[0]) - 1)[:, None]
+        later = (
+            drifted + t_along - since * along,
+            own + 2 * (t_both - since * both) + tt_size - 2 * since * t_size + since**2 * size,
+        )
+        return _explained(self.drift, later, first, last)
+
+    def _later(self, first: int, last: int) -> FloatArray:
+        """Return (term, onset, state) sums up to ``last`` of what is as old as can be told."""
+        oldest = np.arange(first, last + 1) + len(self.shift[0]) - 1
+        return np.asarray(self.later[:, [last + 1]] - self.later[:, np.minimum(oldest, last + 1)])
 
     def noises(self, first: int, last: int) -> FloatArray:
         """Return (state,) the most that noise explains which set in from ``first`` to ``last``.
@@ -216,3 +238,24 @@ def alarm_starts(is_rare: NDArray[np.bool_], gap_steps: int) -> NDArray[np.int64
     begins = in_alarm & ~np.concatenate([[False], in_alarm[:-1]])
     started = np.maximum.accumulate(np.where(begins, times, 0))
     return np.asarray(np.where(in_alarm, started, times))
+
+
+def _explained(
+    young: tuple[FloatArray, FloatArray],
+    later: tuple[FloatArray, FloatArray],
+    first: int,
+    last: int,
+) -> FloatArray:
+    """Return (state,) the square along a signature over its own, at the best onset.
+
+    Both parts are pairs of these products: ``young`` (age, time, state), ``later`` (onset, state).
+    """
+    onsets = np.arange(first, last + 1)
+    sums = []
+    for values, old in zip(young, later, strict=True):
+        total = old.copy()
+        for age in range(len(values) - 1):
+            at = onsets[onsets + age <= last]
+            total[: len(at)] += values[age, at + age]
+        sums.append(total)
+    return np.asarray((sums[0] ** 2 / np.maximum(sums[1], _SMALLEST)).max(axis=0))
