@@ -21,12 +21,10 @@ from odisar.forecasters.closed_form import design, design_width
 
 #: Ridge penalty per sample, in units of the scaled design: keeps states that move as one apart.
 _RIDGE = 1.0e-6
-
-
+#: Consecutive parts of the training samples that are left out in turn to choose regressors by.
+_PARTS = 5
 #: A relation holds if it explains this share of a state's variance on held-out recordings.
 _HOLDS = 0.5
-#: Samples whose products are summed at a time; a matter of memory, not of results.
-_CHUNK = 4096
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,8 @@ class Consistency:
 
     ``states`` are the positions of the states among the features; ``weights`` (state, regressor)
     are of the closed form's regressors with one sample (``closed_form.design``), zero wherever the
-    state itself is in one.
+    state itself is in one. A state has products and squares in its relation only if they said more
+    of training samples that were left out: from few recordings they are learnt by heart.
     """
 
     states: tuple[int, ...]
@@ -46,24 +45,26 @@ class Consistency:
         """Fit on (time, feature) scaled samples of training recordings, by least squares.
 
         Samples that aren't known whole (the first of a relative pose) don't count. Raises
-        OdisarError where fewer are left than there are regressors.
+        OdisarError where fewer are left than a straight relation has weights.
         """
         every = samples.astype(np.float64)
         known = every[np.isfinite(every).all(axis=1)]
         features = every.shape[1]
-        if len(known) <= (needed := design_width(features, 1)):
+        if len(known) <= (needed := features + 1):
             raise OdisarError(
                 f"{len(known)} training samples cannot give the {needed} weights that tie a state "
                 "to the others; add training recordings or declare fewer channels"
             )
-        parts = (_regressors(known[at : at + _CHUNK]) for at in range(0, len(known), _CHUNK))
-        gram = sum((part.T @ part for part in parts), start=np.zeros((needed, needed)))
-        penalised = gram + _RIDGE * len(known) * np.eye(needed)
-        weights = np.zeros((len(states), needed))
+        sums = [
+            _Sums(part.T @ part, len(part))
+            for part in map(_regressors, np.array_split(known, _PARTS))
+        ]
+        weights = np.zeros((len(states), design_width(features, 1)))
         for row, state in enumerate(states):
-            others = np.flatnonzero(_is_of_others(features, state))
-            cross = gram[others, state]
-            weights[row, others] = np.linalg.solve(penalised[np.ix_(others, others)], cross)
+            bent = np.flatnonzero(_is_of_others(features, state))
+            straight = bent[(bent < features) | (bent == weights.shape[1] - 1)]
+            chosen = min((straight, bent), key=lambda columns: _left_out(sums, columns, state))
+            weights[row, chosen] = _Sums.of(sums).solve(chosen, state)
         return cls(tuple(states), weights)
 
     def residuals(self, samples: NDArray[np.floating]) -> FloatArray:
@@ -83,6 +84,42 @@ class Consistency:
         known = samples[np.isfinite(samples).all(axis=1)].astype(np.float64)
         left = np.mean(self.residuals(known) ** 2, axis=0)
         return float(np.mean(left <= (1 - _HOLDS) * known[:, list(self.states)].var(axis=0)))
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Products of the regressors with one another, summed over so many samples."""
+
+    gram: FloatArray
+    samples: int
+
+    @classmethod
+    def of(cls, parts: Sequence["_Sums"]) -> Self:
+        """Return the sums over several parts."""
+        grams = [part.gram for part in parts]
+        return cls(np.sum(grams, axis=0), sum(part.samples for part in parts))
+
+    def solve(self, columns: NDArray[np.intp], state: int) -> FloatArray:
+        """Return (column,) the ridge weights of some regressors for a state, itself a regressor."""
+        penalty = _RIDGE * self.samples * np.eye(len(columns))
+        return np.linalg.solve(
+            self.gram[np.ix_(columns, columns)] + penalty, self.gram[columns, state]
+        )
+
+    def squared_error(self, columns: NDArray[np.intp], state: int, weights: FloatArray) -> float:
+        """Return the sum of squared errors that weights have on these samples."""
+        own, cross = self.gram[state, state], self.gram[columns, state]
+        size = weights @ self.gram[np.ix_(columns, columns)] @ weights
+        return float(own - 2 * weights @ cross + size)
+
+
+def _left_out(parts: Sequence[_Sums], columns: NDArray[np.intp], state: int) -> float:
+    """Return the squared error on all parts, each said by weights fitted to the others."""
+    error = 0.0
+    for number, part in enumerate(parts):
+        others = _Sums.of([*parts[:number], *parts[number + 1 :]])
+        error += part.squared_error(columns, state, others.solve(columns, state))
+    return error
 
 
 def _regressors(samples: FloatArray) -> FloatArray:
