@@ -73,7 +73,8 @@ STUDY_TABLES = (
         "development",
         "scores on development recordings, by which the monitor's was chosen",
         "Development recordings are the only disturbed ones that anything was chosen by. The rule "
-        "takes the candidate of rank 1 by its mean over set-ups and cells.",
+        "takes the candidate of rank 1 by its mean over the cells of its set-up; those that don't "
+        "use the twin have no rank.",
     ),
     StudyTable("dropout", "dropout rates and numbers of draws"),
     StudyTable("leakage", "leakage probes of the study's detectors"),

@@ -23,11 +23,15 @@ Statistics = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those."""
+    """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those.
+
+    One that doesn't use the twin is there to be compared with, not to be chosen.
+    """
 
     name: str
     parts: int
     of: Callable[[Statistics], FloatArray]
+    uses_twin: bool = True
 
 
 def candidates() -> list[Candidate]:
@@ -40,7 +44,10 @@ def candidates() -> list[Candidate]:
     singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in LEADS]
     singles += [RECONSTRUCTION]
     singles += [f"{source}{name}" for source in (CLOSED, PARITY) for name in of_limited()]
-    made = [Candidate(name, 1, lambda s, n=name: s[n]) for name in singles]  # type: ignore[misc]
+    made = [
+        Candidate(name, 1, lambda s, n=name: s[n], not name.startswith((CLOSED, PARITY)))  # type: ignore[misc]
+        for name in singles
+    ]
     for label, size in (("", "log NIS over 5"), (" of one state", "size of one state over 10")):
         made += _combined(label, "T2 of mean over 10", size)
     return made + [
@@ -63,7 +70,7 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     """Return the largest of three, of a mean that single innovations can't rule.
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
-    say as well; last the same without the twin, which is no candidate for a twin's default.
+    say as well; last the same without the twin.
     """
     two = (f"T2 of limited mean over {steps}", f"size of one state over {size}")
     recent = f"T2 of mean over {last}"
@@ -95,6 +102,7 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
                 f"recent mean over {last} (.7, .3); mean with {label}",
                 6,
                 lambda s, tied=tied: (closed(s) + tied(s)) / 2,  # type: ignore[misc]
+                uses_twin=False,
             ),
         ]
     return made

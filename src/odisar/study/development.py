@@ -69,14 +69,16 @@ def run(config: ConfigView, workspace: Workspace) -> None:
 
 
 def ranked(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table with each candidate's mean by the rule, and its rank in its set-up."""
+    """Return the table with each candidate's mean by the rule, and its rank in its set-up.
+
+    Only candidates that use the twin have a rank.
+    """
     half = (table.auroc + table.tnr_at_tpr95) / 2
     mean = half.groupby([table.setup, table.candidate], sort=False).transform("mean")
-    table = table.assign(rule_mean=mean, rank=0)
+    table = table.assign(rule_mean=mean, rank=pd.array([pd.NA] * len(table), dtype="Int64"))
     for _, own in table.groupby("setup", sort=False):
-        first = own.drop_duplicates("candidate").sort_values(
-            "rule_mean", ascending=False, kind="stable"
-        )
+        first = own[own.uses_twin].drop_duplicates("candidate")
+        first = first.sort_values("rule_mean", ascending=False, kind="stable")
         place = {name: number for number, name in enumerate(first.candidate, start=1)}
         table.loc[own.index, "rank"] = own.candidate.map(place)
     return table
@@ -100,6 +102,7 @@ def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, 
             "setup": setup,
             "candidate": one.name,
             "parts": one.parts,
+            "uses_twin": one.uses_twin,
             "kind": kind,
             "strength": strength,
             "recordings": len(members),

@@ -18,8 +18,9 @@ RECENT = "T2 of mean over 3"
 
 
 def judged(*rows):
-    """Return a table of (candidate, set-up, AUROC, TNR@TPR95)."""
-    return pd.DataFrame(rows, columns=["candidate", "setup", "auroc", "tnr_at_tpr95"])
+    """Return a table of (candidate, set-up, AUROC, TNR@TPR95), all of the twin but `free`."""
+    table = pd.DataFrame(rows, columns=["candidate", "setup", "auroc", "tnr_at_tpr95"])
+    return table.assign(uses_twin=table.candidate != "free")
 
 
 def test_the_mean_is_over_the_cells_of_a_set_up_and_ranks_are_its_own():
@@ -38,6 +39,16 @@ def test_the_mean_is_over_the_cells_of_a_set_up_and_ranks_are_its_own():
     assert means["y"].to_dict() == pytest.approx({"wide": 0.4, "even": 0.8})
     assert table["rank"].tolist() == [1, 1, 2, 2, 2, 1]
     assert table.candidate.tolist() == ["wide"] * 3 + ["even"] * 3
+
+
+def test_what_does_not_use_the_twin_is_compared_and_not_ranked():
+    table = ranked(judged(("free", "x", 1.0, 1.0), ("low", "x", 0.5, 0.5), ("high", "x", 0.6, 0.6)))
+    assert table.set_index("candidate")["rank"].dropna().to_dict() == {"high": 1, "low": 2}
+    assert table.set_index("candidate").rule_mean["free"] == 1.0
+    free = [one for one in candidates() if not one.uses_twin]
+    assert {one.parts for one in free} == {1, 6}
+    for one in free:
+        assert one.name.startswith(("no twin", "closed form's", "parity residuals'"))
 
 
 @pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])
