@@ -78,7 +78,8 @@ lab: $(INSTALLED)  ## Open the notebooks in JupyterLab on loopback
 	@$(BIN)/jupyter lab --ip 127.0.0.1 $(if $(filter 0,$(shell id -u)),--allow-root) notebooks
 
 test: $(INSTALLED)  ## Run the whole test suite
-	@$(BIN)/python -m pytest
+	@# A file's tests share costly fixtures: they stay in one process.
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 check: $(INSTALLED)  ## Format, lint, types, import rules, tests
 	@$(BIN)/ruff format --check .

@@ -82,7 +82,10 @@ class Capability:
         windows = reported_windows(scores, stride_steps)
         positions = scores.positions[windows]
         variances = self._scorer.variances(recording, positions)
-        blamed = blame_windows(self._scorer, recording, scores, windows)
+        blamed = np.zeros((len(windows), len(blamed_names(self._scorer.twin))))
+        # Nobody is blamed for what isn't OOD.
+        is_ood = scores.scores[ODISAR][windows] > self._thresholds.score
+        blamed[is_ood] = blame_windows(self._scorer, recording, scores, windows[is_ood])
         made = zip(windows, variances, blamed, strict=True)
         return [
             self._assessment(
@@ -153,8 +156,9 @@ def blame_windows(
 ) -> FloatArray:
     """Return (window, state) how much each state explains of what is seen at these windows.
 
-    States are those of ``blamed_names``; see ``Signatures.blame``. Of the twin's innovations alone:
-    those of the closed form, which count in the score as well, are of the same states.
+    States are those of ``blamed_names``, ``windows`` ascend; see ``Signatures.blame``. Of the
+    twin's innovations alone: the other parts of the score, innovations of the closed form and
+    parity residuals, are of the same states.
     """
     assert scorer.innovation_scores is not None  # noqa: S101 (who asks has checked)
     signatures = Signatures.of(scorer.twin, scorer.innovation_scores.twin)

@@ -4,7 +4,8 @@ Physics ties the states of one instant: a speed to the rate of a pose, a roll to
 fitted relation leaves is a parity residual of analytical redundancy (Chow and Willsky, IEEE Trans.
 Automatic Control 1984). It complements an innovation. A sensor that has been off for a minute
 deceives whoever forecasts from its own past, yet goes on contradicting the others; and a residual
-forgets at once, as no earlier sample is in it.
+forgets at once: no sample before its own is in it (of a relative pose, whose features are rates,
+the one before).
 """
 
 from collections.abc import Sequence
@@ -23,6 +24,10 @@ from odisar.forecasters.closed_form import design, design_width
 _RIDGE = 1.0e-6
 #: Consecutive parts of the training samples that are left out in turn to choose regressors by.
 _PARTS = 5
+#: With more of them no products are tried: they would be fitted for minutes.
+_MOST_REGRESSORS = 500
+#: Samples whose regressors are in memory at a time.
+_CHUNK = 16384
 #: A relation holds if it explains this share of a state's variance on held-out recordings.
 _HOLDS = 0.5
 
@@ -55,16 +60,18 @@ class Consistency:
                 f"{len(known)} training samples cannot give the {needed} weights that tie a state "
                 "to the others; add training recordings or declare fewer channels"
             )
-        sums = [
-            _Sums(part.T @ part, len(part))
-            for part in map(_regressors, np.array_split(known, _PARTS))
-        ]
+        parts = [_Sums.over(part) for part in np.array_split(known, _PARTS)]
+        every_part = _Sums.of(parts)
+        others = [_Sums.of([*parts[:i], *parts[i + 1 :]]) for i in range(_PARTS)]
         weights = np.zeros((len(states), design_width(features, 1)))
         for row, state in enumerate(states):
             bent = np.flatnonzero(_is_of_others(features, state))
             straight = bent[(bent < features) | (bent == weights.shape[1] - 1)]
-            chosen = min((straight, bent), key=lambda columns: _left_out(sums, columns, state))
-            weights[row, chosen] = _Sums.of(sums).solve(chosen, state)
+            chosen = straight
+            if len(bent) <= _MOST_REGRESSORS:
+                errors = [_left_out(parts, others, c, state) for c in (straight, bent)]
+                chosen = bent if errors[1] < errors[0] else straight
+            weights[row, chosen] = every_part.solve(chosen, state)
         return cls(tuple(states), weights)
 
     def residuals(self, samples: NDArray[np.floating]) -> FloatArray:
@@ -72,8 +79,11 @@ class Consistency:
 
         ``samples`` (time, feature) are scaled; NaN where one isn't known whole.
         """
-        values = samples.astype(np.float64)
-        return np.asarray(values[:, list(self.states)] - _regressors(values) @ self.weights.T)
+        parts = [
+            part[:, list(self.states)] - _regressors(part) @ self.weights.T
+            for part in _chunks(samples.astype(np.float64))
+        ]
+        return np.concatenate([np.empty((0, len(self.states))), *parts])
 
     def share_holding(self, samples: NDArray[np.floating]) -> float:
         """Return the share of states whose relation holds on (time, feature) scaled samples.
@@ -82,8 +92,11 @@ class Consistency:
         wasn't fitted to, one that has learnt too much from too little doesn't.
         """
         known = samples[np.isfinite(samples).all(axis=1)].astype(np.float64)
+        if not len(known):
+            return 0.0
         left = np.mean(self.residuals(known) ** 2, axis=0)
-        return float(np.mean(left <= (1 - _HOLDS) * known[:, list(self.states)].var(axis=0)))
+        variance = known[:, list(self.states)].var(axis=0)
+        return float(np.mean((left <= (1 - _HOLDS) * variance) & (variance > 0)))
 
 
 @dataclass(frozen=True)
@@ -92,6 +105,13 @@ class _Sums:
 
     gram: FloatArray
     samples: int
+
+    @classmethod
+    def over(cls, samples: FloatArray) -> Self:
+        """Return the sums over (time, feature) samples."""
+        width = design_width(samples.shape[1], 1)
+        grams = [part.T @ part for part in map(_regressors, _chunks(samples))]
+        return cls(sum(grams, start=np.zeros((width, width))), len(samples))
 
     @classmethod
     def of(cls, parts: Sequence["_Sums"]) -> Self:
@@ -113,13 +133,18 @@ class _Sums:
         return float(own - 2 * weights @ cross + size)
 
 
-def _left_out(parts: Sequence[_Sums], columns: NDArray[np.intp], state: int) -> float:
-    """Return the squared error on all parts, each said by weights fitted to the others."""
-    error = 0.0
-    for number, part in enumerate(parts):
-        others = _Sums.of([*parts[:number], *parts[number + 1 :]])
-        error += part.squared_error(columns, state, others.solve(columns, state))
-    return error
+def _left_out(
+    parts: Sequence[_Sums], others: Sequence[_Sums], columns: NDArray[np.intp], state: int
+) -> float:
+    """Return the squared error on all parts, each said by weights fitted to its ``others``."""
+    return sum(
+        part.squared_error(columns, state, rest.solve(columns, state))
+        for part, rest in zip(parts, others, strict=True)
+    )
+
+
+def _chunks(samples: FloatArray) -> list[FloatArray]:
+    return [samples[at : at + _CHUNK] for at in range(0, len(samples), _CHUNK)]
 
 
 def _regressors(samples: FloatArray) -> FloatArray:

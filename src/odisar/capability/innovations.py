@@ -66,9 +66,14 @@ def fit_precision(values: FloatArray) -> FloatArray:
     if len(known) <= values.shape[1]:
         raise OdisarError(
             f"{len(known)} innovations cannot give the covariance of {values.shape[1]} states; "
-            "add validation recordings or shorten the window"
+            "add validation recordings or shorten the windows of the score (cases.*.score)"
         )
     moment = known.T @ known / len(known)
+    if not moment.any():
+        raise OdisarError(
+            "no state ever differs from what is said of it on validation recordings: nothing there "
+            "moves; add recordings of the machine at work"
+        )
     moment += _SHRINKAGE * np.trace(moment) / len(moment) * np.eye(len(moment))
     return np.asarray(np.linalg.inv(moment))
 
@@ -83,7 +88,14 @@ class LogScale:
     @classmethod
     def fit(cls, statistic: FloatArray) -> Self:
         """Fit on (time,) values of held-out recordings; NaN don't count."""
-        logs = np.log(np.maximum(statistic[np.isfinite(statistic)], _SMALLEST))
+        known = statistic[np.isfinite(statistic)]
+        if not len(known):
+            raise OdisarError(
+                "no held-out recording is long enough for the windows of the score; shorten "
+                "mean_steps, size_steps or recent_steps (cases.*.score in params.yaml), or add "
+                "longer validation recordings"
+            )
+        logs = np.log(np.maximum(known, _SMALLEST))
         usual, rare = np.quantile(logs, [_USUAL, _RARE])
         return cls(float(usual), float(max(rare, usual + 1e-6)))
 

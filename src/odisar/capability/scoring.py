@@ -61,7 +61,7 @@ class InnovationScores:
     @property
     def known_after_steps(self) -> int:
         """How many steps after its first forecast a run has its first score."""
-        parts = (self.twin, self.closed_form, self.consistency)
+        parts = [self.twin, self.closed_form, *([self.consistency] if self.share_holding else [])]
         return max(part.known_after_steps for part in parts)
 
     def of(
@@ -89,8 +89,9 @@ class InnovationScores:
 
 
 def _geometric_mean(*weighed: tuple[FloatArray, float]) -> FloatArray:
-    logs = sum(weight * np.log(scores) for scores, weight in weighed)
-    return np.asarray(np.exp(logs / sum(weight for _, weight in weighed)))
+    counted = [(scores, weight) for scores, weight in weighed if weight > 0]
+    logs = sum(weight * np.log(scores) for scores, weight in counted)
+    return np.asarray(np.exp(logs / sum(weight for _, weight in counted)))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ nearly the same for two states that physics ties (a velocity that reads too high
 creeps); the first sample isn't, and all of them together tell.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ from odisar.twin.bundle import TrainedTwin
 
 #: A direction that is not seen at all explains nothing; keeps 0 / 0 out.
 _SMALLEST = 1.0e-12
+#: An onset is sought no further back, in samples: a bound for time and memory.
+_LONGEST = 1000
 
 
 def blamed_names(twin: TrainedTwin) -> tuple[str, ...]:
@@ -122,21 +125,34 @@ class Signatures:
         """Return (window, state) how much of what is seen each state explains, in std deviations.
 
         ``innovations`` (time, state feature) and ``samples`` (time, feature) are of one gapless
-        run, ``windows`` which of its times are asked for, ``directions`` (time, state, state
-        feature) those of ``state_directions``. It is the root of twice the log likelihood ratio of
-        the state's best fault, a shift, a drift or noise, at the best of its possible onsets.
+        run, ``windows`` which of its times are asked for, ascending, ``directions`` (time, state,
+        state feature) those of ``state_directions``. It is the root of twice the log likelihood
+        ratio of the state's best fault, a shift, a drift or noise, at the best of its possible
+        onsets.
         """
-        seen = _Seen.of(self, np.nan_to_num(innovations), samples, directions)
         # What is rare now may have set in when the oldest sample that is looked at came.
         memory = max(self.score.mean.steps, self.score.size.steps)
         lead_in = memory + len(self.response.linear) - 1
         starts = alarm_starts(self.score.parts(innovations).max(axis=0) >= 1, memory)
+        first = np.maximum(np.maximum(starts[windows] - lead_in, windows - _LONGEST), 0)
         found = np.zeros((len(windows), directions.shape[1]))
-        for row, window in enumerate(windows):
-            first, last = max(0, int(starts[window]) - lead_in), int(window)
-            kinds = (seen.shifts, seen.drifts, seen.noises)
-            found[row] = np.max([kind(first, last) for kind in kinds], axis=0)
+        for piece in _pieces(windows):
+            rows = slice(int(first[piece].min()), int(windows[piece].max()) + 1)
+            seen = _Seen.of(self, np.nan_to_num(innovations[rows]), samples[rows], directions[rows])
+            for row in np.arange(len(windows))[piece]:
+                ends = int(first[row]) - rows.start, int(windows[row]) - rows.start
+                kinds = (seen.shifts(*ends), seen.drifts(*ends), seen.noises(*ends))
+                found[row] = np.max(kinds, axis=0)
         return np.sqrt(found)
+
+
+def _pieces(windows: NDArray[np.int64]) -> Iterator[slice]:
+    """Yield slices of ascending windows, none of which spans more than ``_LONGEST`` samples."""
+    start = 0
+    while start < len(windows):
+        stop = int(np.searchsorted(windows, windows[start] + _LONGEST, side="right"))
+        yield slice(start, stop)
+        start = stop
 
 
 @dataclass(frozen=True)

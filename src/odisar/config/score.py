@@ -8,7 +8,12 @@ from odisar.config.base import PositiveInt, Section
 
 
 class StatisticsConfig(Section):
-    """How many of the last innovations, or parity residuals, statistics look at, and a weight."""
+    """How far back statistics of innovations, or of parity residuals, look.
+
+    ``mean_steps``, ``size_steps`` and ``recent_steps`` are samples: of T2 of the mean, of the size
+    of the state that scatters most, and of T2 of very few, which lets go as soon as a disturbance
+    has ended and has ``recent_share`` of the weight; the rest is that of the larger of the others.
+    """
 
     mean_steps: PositiveInt
     size_steps: PositiveInt

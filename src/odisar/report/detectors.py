@@ -77,7 +77,7 @@ DETECTOR_NAMES = {
 # told apart with any kind of colour vision. Detectors drawn in one figure differ in marker too.
 _LOOKS = {
     MONITOR: ("#0072B2", "o"),
-    WITHOUT_TRANSFORMER: ("#009E73", "P"),
+    WITHOUT_TRANSFORMER: ("#000000", "p"),
     CLOSED_FORM: ("#56B4E9", "s"),
     CONSISTENCY: ("#CC79A7", "<"),
     RECONSTRUCTION: ("#D55E00", "D"),

@@ -142,7 +142,11 @@ def _reading(results: Results) -> list[str]:
             "P2 asks the monitor's question: is a disturbance active now, given what is known now? "
             "P1 is the paper's protocol: a window's score stands for every step of its horizon."
         ),
-        "ODiSAR, closed form alone and reconstruction are three scores of one twin.",
+        (
+            "ODiSAR is the mean of three scores: of the twin's innovations, of its closed form's, "
+            "and of the consistency of one sample. The last two stand beside it alone, and "
+            "together as ODiSAR without Transformer."
+        ),
     ]
     for setup in results.setups:
         auroc = pick(results, setup, ORACLE, "auroc", protocol="P1")

@@ -107,3 +107,37 @@ def test_a_relation_that_explains_less_than_half_of_fresh_samples_does_not_hold(
 def test_states_that_nothing_ties_have_no_relation_that_holds():
     apart, fresh = (generator(7, name).normal(size=(40, 5)) for name in ("little", "more"))
     assert Consistency.fit(apart, (3, 4)).share_holding(fresh) == 0.0
+
+
+@pytest.mark.parametrize(("explained", "share"), [(0.4, 0.0), (0.6, 1.0)])
+def test_half_of_the_variance_decides_whether_a_relation_holds(explained, share):
+    random = generator(7, "half")
+    first, own = random.normal(size=(2, 20000))
+    second = np.sqrt(explained) * first + np.sqrt(1 - explained) * own
+    both = np.column_stack([first, second])
+    assert Consistency.fit(both, (1,)).share_holding(both) == share
+
+
+def test_what_never_moves_has_no_relation_and_no_samples_have_none():
+    random = generator(7, "still")
+    samples = np.column_stack([random.normal(size=(300, 2)), np.zeros(300)])
+    relations = Consistency.fit(samples, (0, 1, 2))
+    assert relations.share_holding(samples) == 0.0
+    assert relations.share_holding(np.full((3, 3), np.nan)) == 0.0
+
+
+def test_with_many_channels_relations_are_straight(monkeypatch):
+    monkeypatch.setattr("odisar.capability.consistency._MOST_REGRESSORS", 3)
+    weights = Consistency.fit(tied_samples("train"), (2,)).weights
+    assert not weights[0, 3:-1].any()
+    assert weights[0, :2].all()
+
+
+def test_rows_are_taken_in_parts_to_the_same_numbers(monkeypatch, relations):
+    samples = tied_samples("train")
+    whole = relations.residuals(samples)
+    monkeypatch.setattr("odisar.capability.consistency._CHUNK", 77)
+    np.testing.assert_allclose(relations.residuals(samples), whole, atol=1e-12)
+    fitted = Consistency.fit(samples, (1, 2)).weights
+    np.testing.assert_allclose(fitted, relations.weights, atol=1e-9)
+    assert relations.residuals(samples[:0]).shape == (0, 2)

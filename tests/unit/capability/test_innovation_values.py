@@ -131,6 +131,7 @@ def test_the_monitors_score_is_the_weighed_geometric_mean_of_its_three_parts(sha
     # Before all parts are known none is weighed.
     since = scores.known_after_steps
     assert np.isnan(found["odisar"][: since - 1]).all()
+    assert since == (8 if share else 6)
     whole = (twin * closed * tied**share) ** (1 / (2 + share))
     np.testing.assert_allclose(found["odisar"][since:], whole[since:], rtol=1e-5)
     wanted = (closed * tied**share) ** (1 / (1 + share))

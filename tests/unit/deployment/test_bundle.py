@@ -195,6 +195,28 @@ def test_settings_that_make_no_sense_are_refused_even_if_sealed(bundle, change, 
     assert complaint in said
 
 
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda tied: tied.update(states=[0, 2]), "are not of the twin's 2 states"),
+        (lambda tied: [row.append(0.0) for row in tied["weights"]], "with 13 weights each"),
+    ],
+)
+def test_relations_of_another_twin_are_refused_even_if_sealed(bundle, change, complaint):
+    edit_sealed(
+        bundle, "capability.json", lambda content: change(content["innovation"]["relations"])
+    )
+    assert complaint in refusal(bundle)
+
+
+def test_a_score_of_other_states_is_refused_even_if_sealed(bundle):
+    def change(content):
+        content["innovation"]["consistency"]["recent"]["precision"] = [[1.0]]
+
+    edit_sealed(bundle, "capability.json", change)
+    assert "covariances of [1, 2] states" in refusal(bundle)
+
+
 def test_a_case_of_other_channels_is_refused_even_if_sealed(bundle):
     edit_sealed(bundle, "case.json", lambda content: content["channels"].reverse())
     assert "differ in channels" in refusal(bundle)

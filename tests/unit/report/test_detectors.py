@@ -16,6 +16,7 @@ from odisar.report.detectors import (
     NOT_DEPLOYABLE,
     ORACLE,
     TWIN_SCORES,
+    WITHOUT_TRANSFORMER,
     alternatives,
     detector_look,
 )
@@ -43,7 +44,14 @@ def test_what_cannot_be_deployed_says_so():
 
 
 @pytest.mark.parametrize(
-    "drawn", [(*TWIN_SCORES, ORACLE), (MONITOR, *CHEAP, "rpm-rule"), (MONITOR, *NEURAL)]
+    "drawn",
+    [
+        (*TWIN_SCORES, ORACLE),
+        (MONITOR, *CHEAP, "rpm-rule"),
+        (MONITOR, *NEURAL),
+        # The best cheap one stands beside the twin's scores.
+        *((WITHOUT_TRANSFORMER, cheap) for cheap in CHEAP),
+    ],
 )
 def test_detectors_of_one_figure_differ_in_colour_and_in_marker(drawn):
     looks = [detector_look(name, drawn) for name in drawn]
