@@ -33,8 +33,8 @@ def test_the_shipped_fleet_has_the_planned_sizes(robot):
         if plan.disturbance != "none":
             made[plan.split, plan.disturbance] += len(plan.recordings)
     assert made == {
-        ("development", "noise"): 16,
-        ("development", "correlated-noise"): 8,
+        ("development", "noise"): 24,
+        ("development", "correlated-noise"): 16,
         ("development", "bias"): 8,
         ("test", "noise"): 100,
         ("test", "correlated-noise"): 20,
