@@ -17,9 +17,10 @@ from odisar.report.style import METRIC_NAMES
 _METHOD = (
     "A twin learns from undisturbed recordings to forecast the next sample and a horizon. The "
     "score holds what it, and the closed form it stands on, said about now against what is "
-    "observed (the innovations), and how well it reconstructs its own forecast; where that is "
-    "rarer than on undisturbed recordings, the machine is taken to be out of distribution. The "
-    "paper's score is the reconstruction alone."
+    "observed (the innovations), each state of the sample against what the others say it should "
+    "be (consistency), and how well the twin reconstructs its own forecast; where that is rarer "
+    "than on undisturbed recordings, the machine is taken to be out of distribution. The paper's "
+    "score is the reconstruction alone."
 )
 
 
