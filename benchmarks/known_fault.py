@@ -23,9 +23,10 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from odisar.artifacts import Workspace, read_json
+from odisar.capability.combined import ODISAR
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.innovations import InnovationScore, moving_mean
-from odisar.capability.scoring import ODISAR, Scorer
+from odisar.capability.scoring import Scorer
 from odisar.config.loader import Config, load_config
 from odisar.evaluation.labels import label_active
 from odisar.evaluation.metrics import auroc, tnr_at_tpr95
@@ -68,8 +69,8 @@ class Watcher:
         self.data: MemberData = load_member(config, workspace, member)
         limits = read_json(workspace.thresholds(member.setup))["members"][member.name]
         fitted = InnovationScoreValues.model_validate(limits["innovation"]).build()
-        self._fitted = fitted
-        self._score: InnovationScore = fitted.twin
+        self._fitted = fitted.parts
+        self._score: InnovationScore = fitted.parts.twin
         self._threshold: float = limits["sigma"][ODISAR]
         self._scorer = Scorer(read_twin(workspace.twin(member.name)), 256, "cpu", fitted)
 

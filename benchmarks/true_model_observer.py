@@ -20,7 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace
-from odisar.capability.innovations import InnovationScore, InnovationSteps
+from odisar.capability.innovations import InnovationScore
 from odisar.config.loader import load_config
 from odisar.config.simulators import VesselSimulatorConfig
 from odisar.evaluation.labels import label_active
@@ -28,6 +28,7 @@ from odisar.evaluation.metrics import auroc, tnr_at_tpr95
 from odisar.recordings.schema import Recording
 from odisar.simulators.vessel.dynamics import STATE_ROWS, Current, Orders, advance, no_force
 from odisar.simulators.vessel.hull import ferry
+from odisar.stages.detectors import score_steps
 from odisar.stages.members import Member, load_member
 
 Array = NDArray[np.float64]
@@ -143,10 +144,7 @@ def main() -> None:
     observer, names = Observer(config.simulators.vessel), data.case.channel_names
     held_out = Fleet.of(data.splits["validation"], names)
     noise = fit_process_noise(observer, held_out)
-    chosen = config.cases["vessel"].score.innovation
-    steps = InnovationSteps(
-        chosen.mean_steps, chosen.size_steps, chosen.recent_steps, chosen.recent_share
-    )
+    steps = score_steps(config.cases["vessel"].score).innovation
     usual, _ = observer.innovations(held_out, noise)
     score = InnovationScore.fit(list(usual.transpose(1, 0, 2)[:, 1:]), None, steps)
     disturbed = [item for item in data.splits["test"] if item.info.is_disturbed]

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from odisar.capability.combined import InnovationScores
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import FloatArray, InnovationScore, InnovationSteps
-from odisar.capability.scoring import RECONSTRUCTION, InnovationScores, RecordingScores, Scorer
+from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
 from odisar.twin.bundle import TrainedTwin
 from small_system import make_recording
 

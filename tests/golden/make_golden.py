@@ -19,6 +19,7 @@ import pandas as pd
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, assessments_json
+from odisar.capability.combined import CLOSED_FORM, ODISAR, InnovationScores
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
@@ -27,13 +28,7 @@ from odisar.capability.innovations import (
     LogScale,
     MeanInnovation,
 )
-from odisar.capability.scoring import (
-    CLOSED_FORM,
-    ODISAR,
-    RECONSTRUCTION,
-    InnovationScores,
-    Scorer,
-)
+from odisar.capability.scoring import RECONSTRUCTION, Scorer
 from odisar.config.cases import Groups
 from odisar.config.judging import Judging, OperatingPoint
 from odisar.config.learning import TwinConfig

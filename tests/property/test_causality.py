@@ -5,7 +5,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from odisar.capability.scoring import CLOSED_FORM, DETECTORS, ODISAR
+from odisar.capability.combined import CLOSED_FORM, ODISAR
+from odisar.capability.scoring import DETECTORS
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from odisar.windows.scaling import channel_std

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odisar.capability.attribution import top_states
+from odisar.capability.combined import ODISAR
 from odisar.capability.innovations import FloatArray
 from odisar.capability.quadrants import quadrant
-from odisar.capability.scoring import ODISAR, RECONSTRUCTION, RecordingScores, Scorer
-from odisar.capability.signatures import Signatures, blamed_names, state_directions
+from odisar.capability.responses import blamed_names, state_directions
+from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
+from odisar.capability.signatures import Signatures
 from odisar.errors import OdisarError
 from odisar.recordings.schema import Recording
 
@@ -161,7 +163,7 @@ def blame_windows(
     parity residuals, are of the same states.
     """
     assert scorer.innovation_scores is not None  # noqa: S101 (who asks has checked)
-    signatures = Signatures.of(scorer.twin, scorer.innovation_scores.twin)
+    signatures = Signatures.of(scorer.twin, scorer.innovation_scores.parts.twin)
     parts = [np.empty((0, len(blamed_names(scorer.twin))))]
     for start, stop in scores.runs:
         own = windows[(windows >= start) & (windows < stop)]

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from odisar.capability.combined import InnovationScores, MeanParts
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
@@ -13,7 +14,7 @@ from odisar.capability.innovations import (
     LogScale,
     MeanInnovation,
 )
-from odisar.capability.scoring import InnovationScores
+from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.config.base import PositiveInt, Section
 
 _NUMBER_LIMIT = 1e30
@@ -72,6 +73,8 @@ class InnovationValues(Section):
     recent: MeanValues
     recent_share: Annotated[float, Field(ge=0, lt=1)]
     reconstruction: ScaleValues | None
+    long: StatisticValues | None
+    long_share: Annotated[float, Field(ge=0, lt=1)]
 
     @classmethod
     def of(cls, score: InnovationScore) -> Self:
@@ -83,6 +86,8 @@ class InnovationValues(Section):
             recent=_mean_values(score.recent),
             recent_share=score.recent_share,
             reconstruction=None if rebuilt is None else ScaleValues(**vars(rebuilt)),
+            long=None if score.long is None else StatisticValues(**_values(score.long)),
+            long_share=score.long_share,
         )
 
     def build(self) -> InnovationScore:
@@ -94,6 +99,8 @@ class InnovationValues(Section):
             _mean(self.recent),
             self.recent_share,
             None if rebuilt is None else LogScale(**rebuilt.model_dump()),
+            None if self.long is None else InnovationSize(**_arguments(self.long)),
+            self.long_share,
         )
 
 
@@ -112,6 +119,40 @@ class RelationValues(Section):
         return self
 
 
+class NoiseStepsValues(Section):
+    """How far back the noise of one sensor looks, and its margin."""
+
+    lasting: PositiveInt
+    recent: PositiveInt
+    recent_share: Annotated[float, Field(ge=0, lt=1)]
+    margin: _Number
+
+
+class NoiseValues(Section):
+    """The score of the noise of one sensor."""
+
+    steps: NoiseStepsValues
+    lasting: ScaleValues
+    recent: ScaleValues
+
+    @classmethod
+    def of(cls, noise: SensorNoise) -> Self:
+        """Return the numbers of a fitted score."""
+        return cls(
+            steps=NoiseStepsValues(**vars(noise.steps)),
+            lasting=ScaleValues(**vars(noise.lasting)),
+            recent=ScaleValues(**vars(noise.recent)),
+        )
+
+    def build(self) -> SensorNoise:
+        """Return the score."""
+        return SensorNoise(
+            NoiseSteps(**self.steps.model_dump()),
+            LogScale(**self.lasting.model_dump()),
+            LogScale(**self.recent.model_dump()),
+        )
+
+
 class InnovationScoreValues(Section):
     """The scores that the monitor's is made of, and the relations that one of them judges."""
 
@@ -120,29 +161,40 @@ class InnovationScoreValues(Section):
     consistency: InnovationValues
     relations: RelationValues
     share_holding: Annotated[float, Field(ge=0, le=1)]
+    noise: NoiseValues
+    scale: ScaleValues
+    scale_without: ScaleValues
 
     @classmethod
     def of(cls, scores: InnovationScores) -> Self:
         """Return the numbers of fitted scores."""
+        parts, tied = scores.parts, scores.parts.relations
         return cls(
-            twin=InnovationValues.of(scores.twin),
-            closed_form=InnovationValues.of(scores.closed_form),
-            consistency=InnovationValues.of(scores.consistency),
-            relations=RelationValues(
-                states=list(scores.relations.states), weights=scores.relations.weights.tolist()
-            ),
-            share_holding=scores.share_holding,
+            twin=InnovationValues.of(parts.twin),
+            closed_form=InnovationValues.of(parts.closed_form),
+            consistency=InnovationValues.of(parts.consistency),
+            relations=RelationValues(states=list(tied.states), weights=tied.weights.tolist()),
+            share_holding=parts.share_holding,
+            noise=NoiseValues.of(scores.noise),
+            scale=ScaleValues(**vars(scores.scale)),
+            scale_without=ScaleValues(**vars(scores.scale_without)),
         )
 
     def build(self) -> InnovationScores:
         """Return the scores."""
         tied = self.relations
-        return InnovationScores(
+        parts = MeanParts(
             self.twin.build(),
             self.closed_form.build(),
             self.consistency.build(),
             Consistency(tuple(tied.states), np.array(tied.weights)),
             self.share_holding,
+        )
+        return InnovationScores(
+            parts,
+            self.noise.build(),
+            LogScale(**self.scale.model_dump()),
+            LogScale(**self.scale_without.model_dump()),
         )
 
     @property
@@ -151,6 +203,7 @@ class InnovationScoreValues(Section):
         parts: list[_Covariant] = []
         for score in (self.twin, self.closed_form, self.consistency):
             parts += [score.mean, score.size, score.recent]
+            parts += [] if score.long is None else [score.long]
             parts += [mean.limit for mean in (score.mean, score.recent) if mean.limit is not None]
         return {len(part.precision) for part in parts}
 

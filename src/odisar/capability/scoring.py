@@ -1,7 +1,8 @@
 """Run a trained twin over a recording: every score that is known at time t, for many t."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -9,8 +10,16 @@ import torch
 from numpy.typing import NDArray
 
 from odisar.baselines.forecast_error import delayed, forecast_rmse
-from odisar.capability.consistency import Consistency
-from odisar.capability.innovations import FloatArray, InnovationScore
+from odisar.capability.combined import (
+    CLOSED_FORM,
+    CONSISTENCY,
+    ODISAR,
+    WITHOUT_TRANSFORMER,
+    InnovationScores,
+    Run,
+)
+from odisar.capability.innovations import FloatArray
+from odisar.capability.outliers import OutlierFilter
 from odisar.capability.scores import (
     predictive_variance,
     reconstruction_error,
@@ -23,12 +32,8 @@ from odisar.twin.transformer import TwinOutput
 from odisar.windows.targets import horizon_targets
 from odisar.windows.window_set import model_inputs, scaled_features
 
-#: The monitor's score, and the same without its Transformer.
-ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
-#: What these are made of: innovations of the closed form, parity residuals. The paper's score.
-CLOSED_FORM, CONSISTENCY, RECONSTRUCTION = "closed-form", "consistency", "reconstruction"
-#: The forecast-error baselines.
-RMSE, RMSE_SHORT = "rmse", "rmse-short-lead"
+#: The paper's score, and the forecast-error baselines.
+RECONSTRUCTION, RMSE, RMSE_SHORT = "reconstruction", "rmse", "rmse-short-lead"
 DETECTORS = (
     ODISAR,
     WITHOUT_TRANSFORMER,
@@ -38,60 +43,6 @@ DETECTORS = (
     RMSE,
     RMSE_SHORT,
 )
-
-
-@dataclass(frozen=True)
-class InnovationScores:
-    """Fitted scores of innovations, the twin's and its closed form's, and of parity residuals.
-
-    The monitor's is the geometric mean of the three. They err for different reasons: the
-    Transformer where it has learnt too little or what it shouldn't, the closed form where things
-    are not linear, both where a fault has been in their past for a while, and the ``relations``
-    within a sample, whose residuals ``consistency`` judges, wherever only time would tell.
-    The last one's weight is the share of states whose relation holds (``share_holding``), 1 where
-    all do as the weight of the others.
-    """
-
-    twin: InnovationScore
-    closed_form: InnovationScore
-    consistency: InnovationScore
-    relations: Consistency
-    share_holding: float
-
-    @property
-    def known_after_steps(self) -> int:
-        """How many steps after its first forecast a run has its first score."""
-        parts = [self.twin, self.closed_form, *([self.consistency] if self.share_holding else [])]
-        return max(part.known_after_steps for part in parts)
-
-    def of(
-        self,
-        innovations: FloatArray,
-        closed_form: FloatArray,
-        samples: NDArray[np.float32],
-        reconstruction: FloatArray,
-    ) -> dict[str, NDArray[np.float32]]:
-        """Return (window,) scores by detector along one gapless run.
-
-        Innovations are (window, state feature), ``samples`` (window, feature), ``reconstruction``
-        errors (window,).
-        """
-        twin = self.twin.score(innovations, reconstruction)
-        closed = self.closed_form.score(closed_form, reconstruction)
-        tied = self.consistency.score(self.relations.residuals(samples), reconstruction)
-        made = {
-            ODISAR: _geometric_mean((twin, 1.0), (closed, 1.0), (tied, self.share_holding)),
-            WITHOUT_TRANSFORMER: _geometric_mean((closed, 1.0), (tied, self.share_holding)),
-            CLOSED_FORM: closed,
-            CONSISTENCY: tied,
-        }
-        return {name: scores.astype(np.float32) for name, scores in made.items()}
-
-
-def _geometric_mean(*weighed: tuple[FloatArray, float]) -> FloatArray:
-    counted = [(scores, weight) for scores, weight in weighed if weight > 0]
-    logs = sum(weight * np.log(scores) for scores, weight in counted)
-    return np.asarray(np.exp(logs / sum(weight for _, weight in counted)))
 
 
 @dataclass(frozen=True)
@@ -129,6 +80,7 @@ class Scorer:
     ) -> None:
         self.twin = twin
         self.innovation_scores = innovation_scores
+        self._outliers = OutlierFilter.of(twin)
         self._batch = batch
         self._device = torch.device(device)
         self._network = twin.network.to(self._device).eval()
@@ -148,9 +100,33 @@ class Scorer:
             positions = self.twin.spec.issue_positions(segment, 1, horizon_steps=needed_after)
             if positions.size:
                 observed = recording.values[: segment[1]]
-                parts.append(self._score_segment(samples, observed, positions, short_lead_steps))
+                found = self._score_segment(samples, observed, positions, short_lead_steps)
+                parts.append(self._with_innovation_scores(recording, found))
         states, features = len(self._network.state_features), len(self.twin.scaler.mean)
         return _joined(parts, len(self.twin.spec.outputs), states, features)
+
+    def runs(self, recording: Recording, scores: RecordingScores) -> list[Run]:
+        """Return what the monitor's score is made of, run by run, of a scored recording."""
+        return [self._run(recording, scores, slice(*ends)) for ends in scores.runs]
+
+    def _run(self, recording: Recording, scores: RecordingScores, at: slice) -> Run:
+        positions, samples = scores.positions[at], scores.samples[at]
+        closed_form = scores.closed_form_innovations[at]
+        return Run(
+            scores.innovations[at],
+            closed_form,
+            samples,
+            scores.scores[RECONSTRUCTION][at].astype(np.float64),
+            partial(self._outliers.squares, recording, positions, closed_form, samples),
+        )
+
+    def _with_innovation_scores(
+        self, recording: Recording, found: RecordingScores
+    ) -> RecordingScores:
+        if self.innovation_scores is None:
+            return found
+        (run,) = self.runs(recording, found)
+        return replace(found, scores=self.innovation_scores.of(run) | dict(found.scores))
 
     def draws(self, recording: Recording, positions: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return (draw, window, step, state) the dropout draws of forecasts, scaled."""
@@ -220,9 +196,6 @@ class Scorer:
         }
         innovations = _innovations(scaled, np.concatenate(following))
         closed_form = _innovations(scaled, np.concatenate(closed))
-        if self.innovation_scores is not None:
-            fitted, errors_now = self.innovation_scores, rebuilt.astype(np.float64)
-            scores = fitted.of(innovations, closed_form, seen, errors_now) | scores
         run = ((0, len(positions)),)
         return RecordingScores(positions, scores, errors, innovations, closed_form, seen, run)
 

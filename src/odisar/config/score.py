@@ -1,10 +1,12 @@
 """The windows of the monitor's score: how far back each of its statistics looks."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from odisar.config.base import PositiveInt, Section
+from odisar.config.base import NonNegativeFloat, PositiveInt, Section
+
+_Weight = Annotated[float, Field(ge=0, lt=1)]
 
 
 class StatisticsConfig(Section):
@@ -18,11 +20,45 @@ class StatisticsConfig(Section):
     mean_steps: PositiveInt
     size_steps: PositiveInt
     recent_steps: PositiveInt
-    recent_share: Annotated[float, Field(ge=0, lt=1)]
+    recent_share: _Weight
+
+
+class InnovationStatisticsConfig(StatisticsConfig):
+    """The same of innovations, with the size over ``long_steps``, which has ``long_share``.
+
+    A little more scatter than usual adds up in it, and it remembers for as long.
+    """
+
+    long_steps: PositiveInt
+    long_share: _Weight
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.recent_share + self.long_share >= 1:
+            raise ValueError(
+                f"recent_share={self.recent_share:g} and long_share={self.long_share:g} leave no "
+                "weight for the mean and the size: together they must be below 1"
+            )
+        return self
+
+
+class NoiseConfig(Section):
+    """How far back the noise of one sensor looks, and how rare it must be.
+
+    ``lasting_steps`` and ``recent_steps`` are samples, the latter with ``recent_share`` of the
+    weight. ``margin`` is taken off: 0 lets noise count as soon as it is as rare as anything else
+    must be, 1 only where it is about twice as far out.
+    """
+
+    lasting_steps: PositiveInt
+    recent_steps: PositiveInt
+    recent_share: _Weight
+    margin: NonNegativeFloat
 
 
 class ScoreConfig(Section):
-    """Of a case's innovations, the twin's and its closed form's alike, and parity residuals."""
+    """Of a case's innovations, the twin's and its closed form's alike, parity residuals, noise."""
 
-    innovation: StatisticsConfig
+    innovation: InnovationStatisticsConfig
     consistency: StatisticsConfig
+    noise: NoiseConfig

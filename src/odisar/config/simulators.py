@@ -158,7 +158,7 @@ class DisturbedRuns(Section):
 
 
 class ComponentRuns(Section):
-    """Runs of split ``test`` in which only one part of the weather is disturbed."""
+    """Runs of one split in which only one part of the weather is disturbed."""
 
     components: list[Component]
     cases: list[DisturbanceCase]
@@ -174,7 +174,7 @@ class FleetConfig(Section):
 
     clean: dict[CleanSplit, dict[Maneuver, NonNegativeInt]]
     disturbed: dict[DisturbedSplit, DisturbedRuns]
-    one_component: ComponentRuns
+    one_component: dict[DisturbedSplit, ComponentRuns]
     heading_sector_deg: PositiveFloat
 
     @model_validator(mode="after")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from odisar.capability.scoring import ODISAR, Scorer
+from odisar.capability.combined import ODISAR
+from odisar.capability.scoring import Scorer
 from odisar.config.cases import Case
 from odisar.config.judging import EvaluationConfig
 from odisar.evaluation.cells import OVERALL, describe, disturbed_cells

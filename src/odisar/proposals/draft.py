@@ -206,9 +206,12 @@ def _judging(draft: Draft) -> Iterator[str]:
     lead = max(round(plan.horizon / 5), 1) / rate_hz
     guard = max(min(plan.horizon, plan.fault_duration // 4), 1) / rate_hz
     yield line(8, "score:", note="how many samples each statistic looks back")
-    for part, recent, share in (("innovation", 3, 0.3), ("consistency", 1, 0.4)):
-        windows = flow(mean_steps=10, size_steps=10, recent_steps=recent, recent_share=share)
-        yield line(12, f"{part}: {windows}")
+    tens = {"mean_steps": 10, "size_steps": 10}
+    few = {"recent_steps": 3, "recent_share": 0.3, "long_steps": 20, "long_share": 0.2}
+    yield line(12, f"innovation: {flow(**tens, **few)}")
+    yield line(12, f"consistency: {flow(**tens, recent_steps=1, recent_share=0.4)}")
+    noise = flow(lasting_steps=10, recent_steps=3, recent_share=0.5, margin=0.3)
+    yield line(12, f"noise: {noise}")
     yield line(
         8,
         f"persistence_s: {scalar(draft.persistence_s)}",

@@ -10,8 +10,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from odisar.artifacts import Workspace, read_json, write_json
+from odisar.capability.combined import InnovationScores
 from odisar.capability.innovation_values import InnovationScoreValues
-from odisar.capability.scoring import InnovationScores, Scorer
+from odisar.capability.scoring import Scorer
 from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
 from odisar.deployment.bundle import read_bundle, write_bundle

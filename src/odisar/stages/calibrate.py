@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace, write_json
 from odisar.capability.assessment import reported_windows
+from odisar.capability.combined import ODISAR
 from odisar.capability.distribution import disjoint_positions
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.scores import predictive_variance
-from odisar.capability.scoring import ODISAR, RECONSTRUCTION, RecordingScores, Scorer
+from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
 from odisar.capability.thresholds import (
     CalibrationRun,
     ConformalThreshold,

@@ -9,15 +9,12 @@ from numpy.typing import NDArray
 from odisar.baselines.interface import Detector, Reference
 from odisar.baselines.range_rule import range_rule_scores
 from odisar.baselines.registry import cheap_detectors, fit_existing
+from odisar.capability.combined import InnovationScores, ScoreSteps
 from odisar.capability.consistency import Consistency
-from odisar.capability.innovations import InnovationScore, InnovationSteps
-from odisar.capability.scoring import (
-    RECONSTRUCTION,
-    InnovationScores,
-    RecordingScores,
-    Scorer,
-)
-from odisar.config.score import StatisticsConfig
+from odisar.capability.innovations import InnovationSteps
+from odisar.capability.outliers import NoiseSteps
+from odisar.capability.scoring import RecordingScores, Scorer
+from odisar.config.score import ScoreConfig
 from odisar.recordings.schema import Recording
 from odisar.seeding import derive_seed
 from odisar.stages.members import MemberData
@@ -79,21 +76,14 @@ def fit_innovation_scores(scorer: Scorer, data: MemberData) -> InnovationScores:
     The relations within a sample on training recordings, all else on validation recordings: no
     weight was fitted to them.
     """
-    relations = fit_relations(data, scorer.twin)
-    found = [
-        scorer.score(item, short_lead_steps=data.case.short_lead_steps)
+    lead = data.case.short_lead_steps
+    runs = [
+        run
         for item in data.splits["validation"]
+        for run in scorer.runs(item, scorer.score(item, short_lead_steps=lead))
     ]
-    runs = [(scores, slice(a + 1, b)) for scores in found for a, b in scores.runs]
-    rebuilt = [s.scores[RECONSTRUCTION][at].astype(np.float64) for s, at in runs]
-    steps, tied = _steps(data.case.score.innovation), _steps(data.case.score.consistency)
-    return InnovationScores(
-        InnovationScore.fit([s.innovations[at] for s, at in runs], rebuilt, steps),
-        InnovationScore.fit([s.closed_form_innovations[at] for s, at in runs], None, steps),
-        InnovationScore.fit([relations.residuals(s.samples[at]) for s, at in runs], None, tied),
-        relations,
-        relations.share_holding(np.concatenate([s.samples for s in found])),
-    )
+    steps = score_steps(data.case.score)
+    return InnovationScores.fit(runs, fit_relations(data, scorer.twin), steps)
 
 
 def fit_relations(data: MemberData, twin: TrainedTwin) -> Consistency:
@@ -102,7 +92,18 @@ def fit_relations(data: MemberData, twin: TrainedTwin) -> Consistency:
     return Consistency.fit(samples.numpy(), twin.network.state_features)
 
 
-def _steps(config: StatisticsConfig) -> InnovationSteps:
-    return InnovationSteps(
-        config.mean_steps, config.size_steps, config.recent_steps, config.recent_share
+def score_steps(config: ScoreConfig) -> ScoreSteps:
+    """Return how far back a case's score looks."""
+    innovation, tied, noise = config.innovation, config.consistency, config.noise
+    return ScoreSteps(
+        InnovationSteps(
+            innovation.mean_steps,
+            innovation.size_steps,
+            innovation.recent_steps,
+            innovation.recent_share,
+            innovation.long_steps,
+            innovation.long_share,
+        ),
+        InnovationSteps(tied.mean_steps, tied.size_steps, tied.recent_steps, tied.recent_share),
+        NoiseSteps(noise.lasting_steps, noise.recent_steps, noise.recent_share, noise.margin),
     )

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from odisar.capability.scoring import DETECTORS, ODISAR
+from odisar.capability.combined import ODISAR
+from odisar.capability.scoring import DETECTORS
 from odisar.config.cases import Case
 from odisar.config.judging import Judging
 from odisar.config.loader import ConfigView

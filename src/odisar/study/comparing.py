@@ -7,7 +7,7 @@ import pandas as pd
 
 from odisar.artifacts import Workspace, write_table
 from odisar.baselines.neural.registry import NOT_DEPLOYABLE
-from odisar.capability.scoring import ODISAR
+from odisar.capability.combined import ODISAR
 from odisar.config.cases import Groups
 from odisar.config.judging import Judging
 from odisar.config.loader import ConfigView

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from odisar.capability.innovations import InnovationScore, InnovationSteps
-from odisar.capability.signatures import Signatures, StepResponse
+from odisar.capability.responses import StepResponse
+from odisar.capability.signatures import Signatures
 from odisar.seeding import generator
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from odisar.capability.combined import InnovationScores
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.innovations import InnovationScore, InnovationSteps
-from odisar.capability.scoring import InnovationScores
 from odisar.seeding import generator
 
 

@@ -8,9 +8,10 @@ import pytest
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, blame_windows
+from odisar.capability.combined import InnovationScores
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationScore
-from odisar.capability.scoring import InnovationScores, Scorer
+from odisar.capability.scoring import Scorer
 from odisar.capability.signatures import (
     StepResponse,
     alarm_starts,

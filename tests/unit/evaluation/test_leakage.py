@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from odisar.baselines.interface import at_samples
-from odisar.capability.scoring import CLOSED_FORM, ODISAR, RECONSTRUCTION, RMSE
+from odisar.capability.combined import CLOSED_FORM, ODISAR
+from odisar.capability.scoring import RECONSTRUCTION, RMSE
 from odisar.errors import OdisarError
 from odisar.evaluation.leakage import ProbePlan, probe_leakage
 from odisar.evaluation.leakage_probes import PROBES, cut_after, score_changes

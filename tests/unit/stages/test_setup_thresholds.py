@@ -3,12 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from odisar.capability.combined import InnovationScores
 from odisar.capability.consistency import Consistency
 from odisar.capability.distribution import NoiseFloor
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.innovations import InnovationScore, InnovationSteps
 from odisar.capability.recalibration import Recalibration
-from odisar.capability.scoring import InnovationScores
 from odisar.config.loader import ConfigView, load_config
 from odisar.evaluation.alarms import calibrate_operating_threshold
 from odisar.stages.calibrate import PARAMS, MemberCalibration, setup_thresholds

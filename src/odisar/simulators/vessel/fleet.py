@@ -79,19 +79,19 @@ def _disturbed_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
 
 
 def _one_component_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
-    runs = config.fleet.one_component
-    for maneuver, variant in variants(config.maneuvers):
-        for case in runs.cases:
-            seed_name = f"test-{maneuver}-{variant}-{case}"
-            for component in runs.components:
-                for strength in runs.strengths:
-                    yield RunPlan(
-                        name=f"{seed_name}-{component}-s{strength:g}",
-                        seed_name=seed_name,
-                        split="test",
-                        maneuver=maneuver,
-                        variant=variant,
-                        disturbance=case,
-                        components=component,
-                        strength=strength,
-                    )
+    for split, runs in config.fleet.one_component.items():
+        for maneuver, variant in variants(config.maneuvers):
+            for case in runs.cases:
+                seed_name = f"{split}-{maneuver}-{variant}-{case}"
+                for component in runs.components:
+                    for strength in runs.strengths:
+                        yield RunPlan(
+                            name=f"{seed_name}-{component}-s{strength:g}",
+                            seed_name=seed_name,
+                            split=split,
+                            maneuver=maneuver,
+                            variant=variant,
+                            disturbance=case,
+                            components=component,
+                            strength=strength,
+                        )
