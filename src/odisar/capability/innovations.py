@@ -29,8 +29,9 @@ _SHRINKAGE = 1.0e-6
 _USUAL, _RARE = 0.5, 0.99
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
-#: The size over many innovations counts no more than this, on the common log scale.
-_SATURATED = 1.5
+#: The size over many innovations counts no more than what is rare, on the common log scale: it
+#: remembers for long, and what is over must not be in it for as long as it would be otherwise.
+SATURATED = 1.0
 #: Below it a statistic is called zero; its log must stay finite.
 _SMALLEST = 1.0e-12
 
@@ -224,7 +225,7 @@ class InnovationScore:
     its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
     mean of very few innovations, which lets go as soon as a disturbance has ended. With weight
     ``long_share`` there may be the size over many innovations, in which a little more scatter than
-    usual adds up; it counts no more than ``_SATURATED``, as it remembers for long. 1 is what is
+    usual adds up; it counts no more than ``SATURATED``, as it remembers for long. 1 is what is
     usual on held-out recordings, e = 2.7 what is rare. The monitor's is made of three of these (see
     ``combined.InnovationScores``).
     """
@@ -284,5 +285,5 @@ class InnovationScore:
         logs = (1 - self.recent_share - self.long_share) * lasting + self.recent_share * recent
         if self.long is not None:
             long = self.long.scale.of(self.long.statistic(innovations))
-            logs = logs + self.long_share * np.minimum(long, _SATURATED)
+            logs = logs + self.long_share * np.minimum(long, SATURATED)
         return np.asarray(np.exp(logs))

@@ -34,7 +34,7 @@ def transformer_gain(results: Results, setup: str) -> list[str]:
         parts.append(f"no difference beyond {_interval(results)} in {found[NOTHING]}")
     if UNKNOWN in found:
         parts.append(f"too few recordings for an interval in {found[UNKNOWN]}")
-    head = f"{setup}: what the Transformer adds to closed form and consistency (P2, overall)"
+    head = f"{setup}: what the Transformer adds to the rest of the score (P2, overall)"
     return [f"{head}: {'; '.join(parts)}."]
 
 

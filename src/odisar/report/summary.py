@@ -18,9 +18,9 @@ _METHOD = (
     "A twin learns from undisturbed recordings to forecast the next sample and a horizon. The "
     "score holds what it, and the closed form it stands on, said about now against what is "
     "observed (the innovations), each state of the sample against what the others say it should "
-    "be (consistency), and how well the twin reconstructs its own forecast; where that is rarer "
-    "than on undisturbed recordings, the machine is taken to be out of distribution. The paper's "
-    "score is the reconstruction alone."
+    "be (consistency), how well the twin reconstructs its own forecast, and whether samples of one "
+    "sensor are off by themselves (noise); where that is rarer than on undisturbed recordings, the "
+    "machine is taken to be out of distribution. The paper's score is the reconstruction alone."
 )
 
 
@@ -144,9 +144,10 @@ def _reading(results: Results) -> list[str]:
             "P1 is the paper's protocol: a window's score stands for every step of its horizon."
         ),
         (
-            "ODiSAR is the mean of three scores: of the twin's innovations, of its closed form's, "
-            "and of the consistency of one sample. The last two stand beside it alone, and "
-            "together as ODiSAR without Transformer."
+            "ODiSAR is the mean of three scores, of the twin's innovations, of its closed form's, "
+            "and of the consistency of one sample, or the noise of one sensor, whichever is rarer. "
+            "Closed form and consistency stand beside it alone; all but the Transformer together "
+            "are ODiSAR without Transformer."
         ),
     ]
     for setup in results.setups:

@@ -1,11 +1,11 @@
 """The scores to choose from: statistics of innovations and parity residuals, put together."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from odisar.capability.innovations import FloatArray
+from odisar.capability.innovations import SATURATED, FloatArray
 from odisar.capability.scoring import RECONSTRUCTION
 
 #: Steps of the windows that are tried, and leads of forecasts that are compared with now.
@@ -13,9 +13,15 @@ WINDOWS, LEADS = (1, 3, 5, 10, 20), (5, 10)
 WEIGHTS, SIZES, LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
 #: Of the few last innovations, and of the sizes of parity residuals, that are offered.
 RECENT, _TIED_SIZES = (1, 3, 5), (3, 10)
+#: The size over many innovations: over how many, and its weight.
+LONG = ((20, 0.2), (60, 0.3), (60, 0.45))
+#: How much further out than the rest the noise of one sensor must be, on the common log scale.
+MARGINS = (0.0, 0.5)
 
 #: Before the name of a statistic of the closed form's innovations, of parity residuals.
 CLOSED, PARITY = "closed form's ", "parity residuals' "
+#: The noise of one sensor, as the monitor's score has it.
+NOISE = "noise of one sensor"
 
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
@@ -25,13 +31,20 @@ Statistics = Mapping[str, FloatArray]
 class Candidate:
     """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those.
 
-    One that doesn't use the twin is there to be compared with, not to be chosen.
+    One that doesn't use the twin is there to be compared with, not to be chosen. With a
+    ``noise_margin`` it is that or the noise of one sensor less the margin, whichever is rarer.
     """
 
     name: str
     parts: int
     of: Callable[[Statistics], FloatArray]
     uses_twin: bool = True
+    noise_margin: float | None = None
+
+    @property
+    def can_be_chosen(self) -> bool:
+        """Whether the rule may choose it (see ``development``)."""
+        return self.uses_twin and self.noise_margin is not None
 
 
 def candidates() -> list[Candidate]:
@@ -40,7 +53,7 @@ def candidates() -> list[Candidate]:
     singles += [f"T2 of limited mean over {k}" for k in LIMITED]
     singles += [f"T2 of exponential mean, weight {a:g}" for a in WEIGHTS]
     singles += [f"log NIS over {k}" for k in SIZES] + ["log NIS over 5, by regime"]
-    singles += [f"size of one state over {k}" for k in SIZES]
+    singles += [f"size of one state over {k}" for k in (*SIZES, *many_steps())]
     singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in LEADS]
     singles += [RECONSTRUCTION]
     singles += [f"{source}{name}" for source in (CLOSED, PARITY) for name in of_limited()]
@@ -62,28 +75,25 @@ def candidates() -> list[Candidate]:
 def of_limited() -> list[str]:
     """Return the statistics that candidates with a limited mean are made of, of each source."""
     means = [f"T2 of limited mean over {k}" for k in LIMITED]
-    sizes = [f"size of one state over {k}" for k in SIZES]
+    sizes = [f"size of one state over {k}" for k in (*SIZES, *many_steps())]
     return [*means, *sizes, *(f"T2 of mean over {k}" for k in RECENT)]
+
+
+def many_steps() -> list[int]:
+    """Return over how many innovations a long size is tried."""
+    return sorted({steps for steps, _ in LONG})
 
 
 def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     """Return the largest of three, of a mean that single innovations can't rule.
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
-    say as well; last the same without the twin.
+    say as well; the last also with the size over many innovations, and with the noise of one
+    sensor beside. In between the same without the twin.
     """
-    two = (f"T2 of limited mean over {steps}", f"size of one state over {size}")
-    recent = f"T2 of mean over {last}"
     name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
     name += f"; recent mean over {last} (.7, .3)"
-
-    def alone(s: Statistics) -> FloatArray:
-        return 0.7 * _largest(s, (*two, RECONSTRUCTION)) + 0.3 * s[recent]
-
-    def closed(s: Statistics) -> FloatArray:
-        lasting = _largest(s, tuple(f"{CLOSED}{name}" for name in two))
-        return 0.7 * lasting + 0.3 * s[f"{CLOSED}{recent}"]
-
+    alone, closed = _view("", steps, size, last), _view(CLOSED, steps, size, last)
     made = [
         Candidate(name, 4, alone),
         Candidate(f"{name}; mean with closed form", 7, lambda s: (alone(s) + closed(s)) / 2),
@@ -91,21 +101,51 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     for tied_size in _TIED_SIZES:
         tied = _tied(tied_size)
         label = f"consistency (size over {tied_size})"
+        whole = f"{name}; mean with closed form and {label}"
         made += [
-            Candidate(
-                f"{name}; mean with closed form and {label}",
-                10,
-                lambda s, tied=tied: (alone(s) + closed(s) + tied(s)) / 3,  # type: ignore[misc]
-            ),
+            Candidate(whole, 10, _mean(alone, closed, tied)),
             Candidate(
                 f"no twin: closed form's limited mean over {steps}, size of one state over {size}; "
                 f"recent mean over {last} (.7, .3); mean with {label}",
                 6,
-                lambda s, tied=tied: (closed(s) + tied(s)) / 2,  # type: ignore[misc]
+                _mean(closed, tied),
                 uses_twin=False,
             ),
         ]
+    for many, share in LONG:
+        views = [_view(source, steps, size, last, many, share) for source in ("", CLOSED)]
+        made.append(Candidate(f"{whole}; size over {many} ({share:g})", 12, _mean(*views, tied)))
+    # Those with every part.
+    full = [one for one in made if one.name.startswith(whole)]
+    for one in full:
+        for margin in MARGINS:
+            beside = f"{one.name}; or {NOISE}, {margin:g}"
+            made.append(replace(one, name=beside, parts=one.parts + 2, noise_margin=margin))
     return made
+
+
+def _view(
+    source: str, steps: int, size: int, last: int, many: int = 0, share: float = 0.0
+) -> Callable[[Statistics], FloatArray]:
+    """Return what the innovations of one source say: of the twin, or of its closed form."""
+    names = [f"T2 of limited mean over {steps}", f"size of one state over {size}"]
+    lasting = (*(f"{source}{name}" for name in names), *([] if source else [RECONSTRUCTION]))
+
+    def of(s: Statistics) -> FloatArray:
+        logs = (0.7 - share) * _largest(s, lasting) + 0.3 * s[f"{source}T2 of mean over {last}"]
+        if share:
+            long = s[f"{source}size of one state over {many}"]
+            logs = logs + share * np.minimum(long, SATURATED)
+        return logs
+
+    return of
+
+
+def _mean(*views: Callable[[Statistics], FloatArray]) -> Callable[[Statistics], FloatArray]:
+    def of(s: Statistics) -> FloatArray:
+        return np.asarray(np.mean([view(s) for view in views], axis=0))
+
+    return of
 
 
 def _tied(size: int) -> Callable[[Statistics], FloatArray]:

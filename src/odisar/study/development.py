@@ -1,10 +1,13 @@
 """Scores on development recordings: what the default was chosen by, and what else there was.
 
-The rule: of the candidates that use the twin, a case's is the one with the highest mean over cells
+The rule: of the candidates that can be chosen, a case's is the one with the highest mean over cells
 (kind and strength) of (AUROC + TNR@TPR95) / 2 by protocol P2. No test recording has a part in it.
+Those can be that use the twin and have the noise of one sensor beside: the ferry's development
+recordings hold weather alone, and by them a detector would better not listen to its sensors.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -21,18 +24,20 @@ from odisar.capability.innovations import (
     moving_mean,
     squared_distance,
 )
+from odisar.capability.outliers import SensorNoise
 from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
 from odisar.config.loader import ConfigView
 from odisar.errors import OdisarError
 from odisar.evaluation.labels import label_active
 from odisar.evaluation.metrics import auroc, tnr_at_tpr95
 from odisar.recordings.schema import Recording
-from odisar.stages.detectors import fit_relations
+from odisar.stages.detectors import fit_relations, score_steps
 from odisar.stages.members import Member, MemberData, load_member
 from odisar.study.candidates import (
     CLOSED,
     LEADS,
     LIMITED,
+    NOISE,
     PARITY,
     RECENT,
     SIZES,
@@ -41,6 +46,7 @@ from odisar.study.candidates import (
     Candidate,
     Statistics,
     candidates,
+    many_steps,
     of_limited,
 )
 from odisar.study.statistics import exponential_mean, lead_errors, log_sizes, regime_distance
@@ -71,13 +77,13 @@ def run(config: ConfigView, workspace: Workspace) -> None:
 def ranked(table: pd.DataFrame) -> pd.DataFrame:
     """Return the table with each candidate's mean by the rule, and its rank in its set-up.
 
-    Only candidates that use the twin have a rank.
+    Only candidates that can be chosen have one.
     """
     half = (table.auroc + table.tnr_at_tpr95) / 2
     mean = half.groupby([table.setup, table.candidate], sort=False).transform("mean")
     table = table.assign(rule_mean=mean, rank=pd.array([pd.NA] * len(table), dtype="Int64"))
     for _, own in table.groupby("setup", sort=False):
-        first = own[own.uses_twin].drop_duplicates("candidate")
+        first = own[own.can_be_chosen].drop_duplicates("candidate")
         first = first.sort_values("rule_mean", ascending=False, kind="stable")
         place = {name: number for number, name in enumerate(first.candidate, start=1)}
         table.loc[own.index, "rank"] = own.candidate.map(place)
@@ -94,30 +100,48 @@ def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, 
             scores = scorer.score(item, short_lead_steps=lead)
             made = {name: make(item, scores) for name, make in makers.items()}
             labels = label_active(item.time_s[scores.positions], item.intervals)
-            key = (item.info.disturbance, item.info.strength or 0.0)
-            key = ("all", key[1]) if data.case.pose is None else key
-            cells.setdefault(key, []).append((made, labels))
+            # On a ship the parts of the weather that are disturbed, on a robot the kind of fault.
+            info = item.info
+            kind = info.components if data.case.pose is None else info.disturbance
+            cells.setdefault((kind, info.strength or 0.0), []).append((made, labels))
+    usual = [{name: make(item, s) for name, make in makers.items()} for item, s in held_out]
+    offered = [(one, _scale(one, usual)) for one in candidates()]
     return [
         {
             "setup": setup,
             "candidate": one.name,
             "parts": one.parts,
-            "uses_twin": one.uses_twin,
+            "can_be_chosen": one.can_be_chosen,
             "kind": kind,
             "strength": strength,
             "recordings": len(members),
-            **_judged(one, members, data.spec.horizon_steps),
+            **_judged(one, scale, members, data.spec.horizon_steps),
         }
-        for one in candidates()
+        for one, scale in offered
         for (kind, strength), members in sorted(cells.items())
     ]
 
 
+def _scale(one: Candidate, usual: Sequence[Statistics]) -> LogScale:
+    """Return what puts a candidate on the scale of noise: held-out recordings are as rare there."""
+    return LogScale.fit(np.exp(np.concatenate([one.of(made) for made in usual])))
+
+
+def _said(one: Candidate, scale: LogScale, made: Statistics) -> FloatArray:
+    mean = one.of(made)
+    if one.noise_margin is None:
+        return mean
+    return np.maximum(scale.of(np.exp(mean)), made[NOISE] - one.noise_margin)
+
+
 def _judged(
-    one: Candidate, members: list[tuple[Statistics, NDArray[np.bool_]]], horizon_steps: int
+    one: Candidate,
+    scale: LogScale,
+    members: list[tuple[Statistics, NDArray[np.bool_]]],
+    horizon_steps: int,
 ) -> dict[str, float]:
     # As in the pipeline's tables, time before a forecast error could be known is left out.
-    scores = np.concatenate([one.of(made)[horizon_steps:] for made, _ in members])
+    scores = np.concatenate([_said(one, scale, made)[horizon_steps:] for made, _ in members])
     labels = np.concatenate([labels[horizon_steps:] for _, labels in members])
     known = np.isfinite(scores)
     return {
@@ -157,7 +181,24 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
             data, scorer, [item for item, _ in held_out], lead, 10
         )
     raw[RECONSTRUCTION] = lambda _, s: s.scores[RECONSTRUCTION].astype(np.float64)
-    return {name: _scaled(make, held_out) for name, make in raw.items()}
+    made = {name: _scaled(make, held_out) for name, make in raw.items()}
+    made[NOISE] = _noise(data, scorer, held_out)
+    return made
+
+
+def _noise(data: MemberData, scorer: Scorer, held_out: HeldOut) -> Maker:
+    """Return what makes the noise of one sensor, without a margin."""
+    closed = [s.closed_form_innovations for _, s in held_out]
+    precision = fit_precision(np.concatenate(closed))
+    runs = [run for item, scores in held_out for run in scorer.runs(item, scores)]
+    steps = replace(score_steps(data.case.score).noise, margin=0.0)
+    noise = SensorNoise.fit([run.outliers(precision) for run in runs], steps)
+
+    def make(item: Recording, scores: RecordingScores) -> FloatArray:
+        found = [noise.score(run.outliers(precision)) for run in scorer.runs(item, scores)]
+        return np.concatenate(found)
+
+    return make
 
 
 def _limited_statistics(
@@ -166,7 +207,7 @@ def _limited_statistics(
     """Return what ``of_limited`` names, fitted on runs of innovations."""
     limit = InnovationLimit.fit(runs)
     fitted = [MeanInnovation.fit(runs, k, limit).statistic for k in LIMITED]
-    fitted += [InnovationSize.fit(runs, k).statistic for k in SIZES]
+    fitted += [InnovationSize.fit(runs, k).statistic for k in (*SIZES, *many_steps())]
     fitted += [MeanInnovation.fit(runs, k, None).statistic for k in RECENT]
     return dict(zip(of_limited(), fitted, strict=True))
 
