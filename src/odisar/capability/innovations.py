@@ -29,8 +29,8 @@ _SHRINKAGE = 1.0e-6
 _USUAL, _RARE = 0.5, 0.99
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
-#: The size over many innovations counts no more than what is rare, on the common log scale: it
-#: remembers for long, and what is over must not be in it for as long as it would be otherwise.
+#: The size over many innovations counts no more than this, what is rare, on the common log scale:
+#: it remembers for long, and must not keep up an alarm about what is over.
 SATURATED = 1.0
 #: Below it a statistic is called zero; its log must stay finite.
 _SMALLEST = 1.0e-12
