@@ -20,8 +20,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace
-from odisar.capability.innovations import InnovationScore
+from odisar.capability.combined import SATURATED
+from odisar.capability.innovations import InnovationScore, InnovationSize
 from odisar.config.loader import load_config
+from odisar.config.score import ScoreConfig
 from odisar.config.simulators import VesselSimulatorConfig
 from odisar.evaluation.labels import label_active
 from odisar.evaluation.metrics import auroc, tnr_at_tpr95
@@ -137,6 +139,29 @@ def fit_process_noise(observer: Observer, fleet: Fleet) -> Array:
     return scaled(*max(trials, key=lambda pair: trials[pair]))
 
 
+@dataclass(frozen=True)
+class Judge:
+    """The statistics that the monitor has of innovations, scatter that adds up among them."""
+
+    score_of_innovations: InnovationScore
+    scatter: InnovationSize
+    share: float
+
+    @classmethod
+    def fit(cls, runs: Sequence[Array], config: ScoreConfig) -> "Judge":
+        """Fit on innovations (time, state) of undisturbed recordings."""
+        steps = score_steps(config)
+        score = InnovationScore.fit(runs, None, steps.innovation)
+        return cls(score, InnovationSize.fit(runs, steps.scatter), steps.scatter_share)
+
+    def score(self, innovations: Array) -> Array:
+        """Return (time,) scores of one run, as of the closed form alone."""
+        logs = np.log(self.score_of_innovations.score(innovations, np.zeros(len(innovations))))
+        scatter = self.scatter.scale.of(self.scatter.statistic(innovations))
+        mixed = (1 - self.share) * logs + self.share * np.minimum(scatter, SATURATED)
+        return np.asarray(np.exp(mixed))
+
+
 def main() -> None:
     """Fit, score, and print by component and strength."""
     config, workspace = load_config(Path.cwd()), Workspace(Path.cwd())
@@ -144,16 +169,15 @@ def main() -> None:
     observer, names = Observer(config.simulators.vessel), data.case.channel_names
     held_out = Fleet.of(data.splits["validation"], names)
     noise = fit_process_noise(observer, held_out)
-    steps = score_steps(config.cases["vessel"].score).innovation
     usual, _ = observer.innovations(held_out, noise)
-    score = InnovationScore.fit(list(usual.transpose(1, 0, 2)[:, 1:]), None, steps)
+    judge = Judge.fit(list(usual.transpose(1, 0, 2)[:, 1:]), config.cases["vessel"].score)
     disturbed = [item for item in data.splits["test"] if item.info.is_disturbed]
     found, _ = observer.innovations(Fleet.of(disturbed, names), noise)
     cells: dict[tuple[str, float], list[tuple[Array, NDArray[np.bool_]]]] = {}
     # As in the pipeline's tables: from the first time at which every detector can speak.
     first = data.spec.context_steps + data.spec.horizon_steps
     for run, item in enumerate(disturbed):
-        scores = score.score(found[:, run], np.zeros(len(found)))[first:]
+        scores = judge.score(found[:, run])[first:]
         labels = label_active(item.time_s[first:], item.intervals)
         cells.setdefault((item.info.components, item.info.strength), []).append((scores, labels))
     rows = []

@@ -16,7 +16,7 @@ from odisar.deployment.manifest import Origin
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from small_innovations import fit_small_scores
-from small_system import CHANNELS, SPEC, make_recording
+from small_system import CHANNELS, SCORE, SPEC, make_recording
 
 MAX_ROWS = 2000
 
@@ -59,10 +59,7 @@ def small_case(**changes: object) -> Case:
             "block_s": None,
             "block_gap_s": None,
         },
-        "score": {
-            part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
-            for part in ("innovation", "consistency")
-        },
+        "score": SCORE,
         "persistence_s": 3.0,
         "short_lead_s": 3.0,
         "guard_start_s": 5.0,

@@ -79,6 +79,17 @@ def make_drive(name: str, samples: int = 200, noise_m: float = 1e-4) -> Recordin
     return Recording(name, info, np.cumsum(steps_s), values)
 
 
+def turned(drive: Recording, angle: float) -> Recording:
+    """Return the drive as it is on a map that is turned by an angle in radians."""
+    values = drive.values.copy()
+    x, y = drive.values[:, :2].T
+    values[:, 0] = np.cos(angle) * x - np.sin(angle) * y
+    values[:, 1] = np.sin(angle) * x + np.cos(angle) * y
+    half = np.arctan2(values[:, 2], values[:, 3]) + angle / 2
+    values[:, 2], values[:, 3] = np.sin(half), np.cos(half)
+    return changed(drive, values)
+
+
 def changed(recording: Recording, values: np.ndarray, segments=()) -> Recording:
     """Return the recording with other values or segments."""
     return Recording(

@@ -10,6 +10,14 @@ from odisar.windows.windowing import WindowSpec
 
 SPEC = WindowSpec(context_steps=20, horizon_steps=10, outputs=(1, 2), commands=(0,), known_ahead=())
 CHANNELS = ("Command", "Speed", "Turn Rate")
+_STATISTICS = {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
+#: A score that looks back a few samples, as a case in params.yaml has it.
+SCORE = {
+    "innovation": _STATISTICS,
+    "consistency": dict(_STATISTICS),
+    "scatter": {"steps": 10, "share": 0.2},
+    "noise": {"lasting_steps": 6, "recent_steps": 2, "recent_share": 0.5, "margin": 0.2},
+}
 
 
 def make_recording(name: str, samples: int = 300, push: float = 0.0) -> Recording:
@@ -29,6 +37,19 @@ def make_recording(name: str, samples: int = 300, push: float = 0.0) -> Recordin
     intervals = (Interval(float(third), float(2 * third), "push"),) if push else ()
     info = RecordingInfo("system", disturbance="push" if push else "none", base_seed=name)
     return Recording(name, info, time_s, values, intervals)
+
+
+def make_gusty(name: str, samples: int = 400) -> Recording:
+    """Return a machine of exact sensors that gusts push about: most are weak, a few are not."""
+    random = generator(7, "gusty", name)
+    command = np.repeat(random.choice([-1.0, 0.0, 1.0], samples // 20 + 1), 20)[:samples]
+    gusts = 0.05 * random.standard_t(3, size=(samples, 2)) @ [[1.0, 0.3], [0.0, 1.0]]
+    states = np.zeros((samples, 2))
+    for i in range(1, samples):
+        states[i] = 0.9 * states[i - 1] + 0.1 * command[i - 1] + gusts[i]
+    info = RecordingInfo("system", base_seed=name)
+    time_s = np.arange(samples, dtype=np.float64)
+    return Recording(name, info, time_s, np.column_stack([command, states]))
 
 
 def small_plan() -> TrainingPlan:

@@ -19,7 +19,7 @@ import pandas as pd
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, assessments_json
-from odisar.capability.combined import CLOSED_FORM, ODISAR, InnovationScores
+from odisar.capability.combined import CLOSED_FORM, ODISAR, InnovationScores, MeanParts
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
@@ -28,6 +28,7 @@ from odisar.capability.innovations import (
     LogScale,
     MeanInnovation,
 )
+from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.scoring import RECONSTRUCTION, Scorer
 from odisar.config.cases import Groups
 from odisar.config.judging import Judging, OperatingPoint
@@ -147,13 +148,17 @@ def analytic_scores() -> InnovationScores:
     mean = MeanInnovation(4, np.array([[2.0, 0.3], [0.3, 1.0]]), LogScale(-0.5, 1.5), limit)
     size = InnovationSize(2, np.array([[1.5, -0.2], [-0.2, 0.8]]), LogScale(-0.7, 0.9))
     recent = MeanInnovation(2, np.array([[0.9, 0.1], [0.1, 0.7]]), LogScale(-0.8, 1.9), None)
-    return InnovationScores(
+    parts = MeanParts(
         InnovationScore(mean, size, recent, 0.3, LogScale(-0.2, 0.1)),
         InnovationScore(mean, size, recent, 0.3, None),
         InnovationScore(mean, size, recent, 0.4, None),
         analytic_relations(),
-        0.5,
+        share_holding=0.5,
+        scatter=None,
     )
+    steps = NoiseSteps(lasting=3, recent=2, recent_share=0.5, margin=0.1)
+    noise = SensorNoise(steps, LogScale(-0.5, 0.3), LogScale(-0.6, 0.4))
+    return InnovationScores(parts, noise, LogScale(-0.3, 1.2), LogScale(-0.4, 1.3))
 
 
 def analytic_relations() -> Consistency:

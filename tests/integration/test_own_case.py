@@ -16,6 +16,7 @@ from ruamel.yaml import YAML
 
 from odisar.artifacts import Workspace
 from odisar.capability.assessment import assessment_schema
+from small_system import SCORE
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TITLE = "Rover in a quarry"
@@ -65,10 +66,7 @@ ROVER = {
         "block_s": 50.0,
         "block_gap_s": 10.0,
     },
-    "score": {
-        part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
-        for part in ("innovation", "consistency")
-    },
+    "score": SCORE,
     "persistence_s": 1.0,
     "short_lead_s": 1.0,
     "guard_start_s": 2.0,

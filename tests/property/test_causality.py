@@ -10,7 +10,7 @@ from odisar.capability.scoring import DETECTORS
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from odisar.windows.scaling import channel_std
-from small_innovations import STEPS, small_scorer
+from small_innovations import KNOWN_AFTER, small_scorer
 from small_system import make_recording
 
 SAMPLES = 120
@@ -86,8 +86,7 @@ def test_the_variance_of_a_window_depends_on_nothing_later_or_beside_it(twin):
 def test_the_last_sample_of_a_recording_is_scored(twin):
     scores = small_scorer(twin, 32).score(RECORDING, short_lead_steps=LEAD)
     assert scores.positions[-1] == SAMPLES - 1
-    first = STEPS.mean
     for detector in (ODISAR, CLOSED_FORM):
         known = np.isfinite(scores.scores[detector])
-        assert not known[:first].any()
-        assert known[first:].all()
+        assert not known[:KNOWN_AFTER].any()
+        assert known[KNOWN_AFTER:].all()

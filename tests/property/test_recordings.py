@@ -17,6 +17,7 @@ from odisar.recordings.schema import Interval, Recording, RecordingInfo, label_t
 from odisar.recordings.splits import PARTS, assign_splits, deal_blocks
 from odisar.recordings.store import read_store, write_store
 from odisar.recordings.writer import write_recordings
+from small_system import SCORE
 
 TEXT = st.text(st.characters(min_codepoint=32, exclude_categories=("C", "Z")), max_size=8)
 NUMBER = st.floats(-1e6, 1e6)
@@ -39,10 +40,7 @@ def make_case(splits=None, faults=None):
         window={"context_steps": 2, "horizon_steps": 1},
         splits={"kind": "metadata", "fractions": None, "folds": None, "block_s": None,
                 "block_gap_s": None} | (splits or {}),
-        score={
-            part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
-            for part in ("innovation", "consistency")
-        },
+        score=SCORE,
         persistence_s=1.0,
         short_lead_s=0.5,
         guard_start_s=10.0,

@@ -19,12 +19,14 @@ from odisar.capability.outliers import NoiseSteps, SensorNoise
 
 #: The monitor's score, and the same without its Transformer.
 ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
-#: What these are made of: innovations of the closed form, parity residuals.
+#: What these are made of: innovations of the closed form (and their scatter), parity residuals.
 CLOSED_FORM, CONSISTENCY = "closed-form", "consistency"
 _OF_CLOSED_FORM = (WITHOUT_TRANSFORMER, CLOSED_FORM)
 
 #: Scatter counts no more than this, what is rare, on the common log scale.
 SATURATED = 1.0
+#: A sensor may read anything; a score must stay a number in single precision, and in JSON.
+_LARGEST = 1.0e30
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ class InnovationScores:
         noise = self.noise.score(run.outliers(self.parts.closed_form.size.precision))
         for name, scale in ((ODISAR, self.scale), (WITHOUT_TRANSFORMER, self.scale_without)):
             made[name] = np.exp(np.maximum(scale.of(made[name]), noise))
-        return {name: scores.astype(np.float32) for name, scores in made.items()}
+        return {name: np.minimum(part, _LARGEST).astype(np.float32) for name, part in made.items()}
 
 
 def _geometric_mean(*weighed: tuple[FloatArray, float]) -> FloatArray:

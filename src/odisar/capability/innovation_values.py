@@ -139,7 +139,7 @@ class NoiseStepsValues(Section):
     lasting: PositiveInt
     recent: PositiveInt
     recent_share: Annotated[float, Field(ge=0, lt=1)]
-    margin: _Number
+    margin: Annotated[float, Field(ge=0, le=_NUMBER_LIMIT)]
 
 
 class NoiseValues(Section):

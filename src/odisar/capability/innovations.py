@@ -91,9 +91,8 @@ class LogScale:
         known = statistic[np.isfinite(statistic)]
         if not len(known):
             raise OdisarError(
-                "no held-out recording is long enough for the windows of the score; shorten "
-                "mean_steps, size_steps or recent_steps (cases.*.score in params.yaml), or add "
-                "longer validation recordings"
+                "no held-out recording is long enough for the windows of the score; shorten them "
+                "(the steps in cases.*.score of params.yaml), or add longer validation recordings"
             )
         logs = np.log(np.maximum(known, _SMALLEST))
         usual, rare = np.quantile(logs, [_USUAL, _RARE])

@@ -29,7 +29,11 @@ _POSE = slice(3)
 
 @dataclass(frozen=True)
 class OutlierFilter:
-    """What one wrong sample of each state would leave in two innovations of the closed form."""
+    """What one wrong sample of each state would leave in two innovations of the closed form.
+
+    Of a relative pose a wrong position is two wrong rates, taken as equal, opposite and along the
+    axes of the earlier heading: where stamps jitter or the machine turns, nearly so.
+    """
 
     twin: TrainedTwin
     response: StepResponse

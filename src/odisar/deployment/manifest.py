@@ -16,7 +16,7 @@ MANIFEST_FILE = "manifest.json"
 #: Rises when a bundle written now can't be read by an older odisar, or the other way round.
 #: 2: the score takes the closed form in, so that thresholds of before would mean something else.
 #: 3: it takes the consistency of one sample in.
-#: 4: it takes the noise of one sensor and the size over many samples in.
+#: 4: it takes the noise of one sensor and the scatter over many samples in.
 SCHEMA_VERSION = 4
 #: No manifest is longer, no other JSON, and no file of a bundle at all: bytes.
 MANIFEST_LIMIT = 1_000_000

@@ -8,50 +8,46 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from odisar.capability.combined import InnovationScores
-from odisar.capability.consistency import Consistency
+from invented_scores import STEPS, invented_run, invented_scores
 from odisar.capability.innovation_values import InnovationScoreValues
-from odisar.capability.innovations import InnovationScore, InnovationSteps
-from odisar.seeding import generator
-
-
-def fitted(states: int = 2, share_holding: float = 0.5) -> InnovationScores:
-    random = generator(5, "values")
-    steps = InnovationSteps(mean=6, size=4, recent=2, recent_share=0.25)
-    runs, rebuilt = [random.normal(size=(200, states))], [np.exp(random.normal(size=200))]
-    # One that stands out, so that the limit counts.
-    runs[0][50] *= 20
-    samples = random.normal(size=(200, states + 1))
-    relations = Consistency.fit(samples, range(states))
-    return InnovationScores(
-        InnovationScore.fit(runs, rebuilt, steps),
-        InnovationScore.fit(runs, None, steps),
-        InnovationScore.fit([relations.residuals(samples)], None, replace(steps, mean=8)),
-        relations,
-        share_holding,
-    )
-
-
-def fresh(stream: str) -> tuple[np.ndarray, ...]:
-    """Return innovations, those of the closed form, samples and reconstruction errors."""
-    random = generator(5, stream)
-    innovations, samples = random.normal(size=(2, 50, 2)), random.normal(size=(50, 3))
-    return *innovations, samples.astype(np.float32), np.exp(random.normal(size=50))
 
 
 @pytest.fixture
 def content():
-    return json.loads(InnovationScoreValues.of(fitted()).model_dump_json())
+    return json.loads(InnovationScoreValues.of(invented_scores()).model_dump_json())
 
 
 def test_a_score_comes_back_from_json_and_says_the_same(content):
-    scores, back = fitted(), InnovationScoreValues.model_validate(content).build()
-    wanted, found = scores.of(*fresh("fresh")), back.of(*fresh("fresh"))
+    scores, back = invented_scores(), InnovationScoreValues.model_validate(content).build()
+    wanted, found = scores.of(invented_run("fresh")), back.of(invented_run("fresh"))
     assert wanted.keys() == found.keys()
     for name, values in wanted.items():
         np.testing.assert_array_equal(found[name], values)
-    assert (back.twin.known_after_steps, back.known_after_steps) == (6, 8)
-    assert back.closed_form.reconstruction is None
+    assert (back.parts.twin.known_after_steps, back.known_after_steps) == (6, 8)
+    assert back.parts.closed_form.reconstruction is None
+
+
+def test_noise_scatter_and_the_scales_come_back_as_they_were(content):
+    scores, back = invented_scores(), InnovationScoreValues.model_validate(content).build()
+    assert back.noise == scores.noise
+    assert back.noise.steps == STEPS.noise
+    assert (back.scale, back.scale_without) == (scores.scale, scores.scale_without)
+    assert back.scale != back.scale_without
+    assert back.parts.scatter.share == 0.15
+    for part in ("twin", "closed_form"):
+        wanted, found = getattr(scores.parts.scatter, part), getattr(back.parts.scatter, part)
+        np.testing.assert_array_equal(found.precision, wanted.precision)
+        assert (found.steps, found.scale) == (7, wanted.scale)
+
+
+def test_without_scatter_the_mapping_says_null_and_must_say_so(content):
+    none = InnovationScoreValues.of(invented_scores(replace(STEPS, scatter_share=0.0)))
+    content = json.loads(none.model_dump_json())
+    assert content["scatter"] is None
+    assert InnovationScoreValues.model_validate(content).build().parts.scatter is None
+    del content["scatter"]
+    with pytest.raises(ValidationError, match="scatter"):
+        InnovationScoreValues.model_validate(content)
 
 
 def test_values_come_back_equal(content):
@@ -61,8 +57,10 @@ def test_values_come_back_equal(content):
 
 def test_the_number_of_states_is_that_of_every_covariance(content):
     assert InnovationScoreValues.model_validate(content).states == {2}
-    content["closed_form"]["recent"]["precision"] = [[1.0]]
-    assert InnovationScoreValues.model_validate(content).states == {1, 2}
+    for part, key in (("closed_form", "recent"), ("scatter", "twin"), ("scatter", "closed_form")):
+        other = copy.deepcopy(content)
+        other[part][key]["precision"] = [[1.0]]
+        assert InnovationScoreValues.model_validate(other).states == {1, 2}
 
 
 def test_without_a_reconstruction_the_mapping_says_null(content):
@@ -122,24 +120,6 @@ def test_a_part_that_is_missing_is_named(content, key):
         InnovationScoreValues.model_validate(content)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
-def test_the_monitors_score_is_the_weighed_geometric_mean_of_its_three_parts(share):
-    scores, seen = fitted(share_holding=share), fresh("both")
-    found = {name: part.astype(np.float64) for name, part in scores.of(*seen).items()}
-    twin = scores.twin.score(seen[0], seen[-1])
-    closed, tied = found["closed-form"], found["consistency"]
-    # Before all parts are known none is weighed.
-    since = scores.known_after_steps
-    assert np.isnan(found["odisar"][: since - 1]).all()
-    assert since == (8 if share else 6)
-    whole = (twin * closed * tied**share) ** (1 / (2 + share))
-    np.testing.assert_allclose(found["odisar"][since:], whole[since:], rtol=1e-5)
-    wanted = (closed * tied**share) ** (1 / (1 + share))
-    np.testing.assert_allclose(found["without-transformer"][since:], wanted[since:], rtol=1e-5)
-    residuals = scores.relations.residuals(seen[2])
-    np.testing.assert_allclose(tied, scores.consistency.score(residuals, seen[-1]), rtol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("key", "value", "complaint"),
     [
@@ -153,4 +133,41 @@ def test_the_monitors_score_is_the_weighed_geometric_mean_of_its_three_parts(sha
 def test_relations_that_can_be_none_are_refused(content, key, value, complaint):
     content["relations"][key] = value
     with pytest.raises(ValidationError, match=complaint):
+        InnovationScoreValues.model_validate(content)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "complaint"),
+    [
+        (("noise", "steps", "lasting"), 0, "greater than 0"),
+        (("noise", "steps", "recent"), 1.5, "valid integer"),
+        (("noise", "steps", "recent_share"), 1.0, "less than 1"),
+        (("noise", "steps", "margin"), float("nan"), "margin"),
+        (("noise", "steps", "note"), 1, "Extra inputs"),
+        (("noise", "lasting"), {"usual": 1.0, "rare": 1.0}, "must be above usual=1.0"),
+        (("noise", "recent"), None, "noise.recent"),
+        (("noise",), None, "noise"),
+        (("scatter", "share"), 0.0, "greater than 0"),
+        (("scatter", "share"), 1.0, "less than 1"),
+        (("scatter", "twin", "steps"), 0, "greater than 0"),
+        (("scatter", "twin", "precision"), [[1.0, 0.0]], "expected 1 numbers in each row"),
+        (("scatter", "closed_form", "scale"), {"usual": 2.0, "rare": 1.0}, "above usual=2.0"),
+        (("scatter", "closed_form"), None, "scatter.closed_form"),
+        (("scale",), {"usual": 1.0, "rare": 0.0}, "must be above usual=1.0"),
+        (("scale_without",), {"usual": 0.0}, "scale_without.rare"),
+    ],
+)
+def test_noise_scatter_and_scales_that_can_be_none_are_refused(content, place, value, complaint):
+    at = content
+    for key in place[:-1]:
+        at = at[key]
+    at[place[-1]] = value
+    with pytest.raises(ValidationError, match=complaint):
+        InnovationScoreValues.model_validate(content)
+
+
+@pytest.mark.parametrize("key", ["noise", "scale", "scale_without", "share_holding", "relations"])
+def test_whatever_of_the_whole_is_missing_is_named(content, key):
+    del content[key]
+    with pytest.raises(ValidationError, match=key):
         InnovationScoreValues.model_validate(content)

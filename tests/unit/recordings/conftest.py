@@ -17,6 +17,7 @@ from odisar.config.cases import Case
 from odisar.recordings.quality import Finding
 from odisar.recordings.reader import ReadResult, read_case
 from odisar.recordings.schema import Recording, RecordingInfo
+from small_system import SCORE
 
 from .ros_bags import STORAGES, Message, Ros
 
@@ -72,10 +73,7 @@ def case_values() -> dict[str, Any]:
             "block_s": None,
             "block_gap_s": None,
         },
-        "score": {
-            part: {"mean_steps": 10, "size_steps": 5, "recent_steps": 3, "recent_share": 0.3}
-            for part in ("innovation", "consistency")
-        },
+        "score": SCORE,
         "persistence_s": 2.0,
         "short_lead_s": 1.0,
         "guard_start_s": 10.0,

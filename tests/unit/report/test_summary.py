@@ -45,7 +45,7 @@ def test_a_difference_whose_interval_includes_zero_is_said_to_be_no_more(results
 
 def test_the_first_sentence_says_where_the_transformer_adds_and_where_nothing(results):
     first = summarise(results).gains[0]
-    assert first.startswith("vessel-all: what the Transformer adds to closed form and consistency")
+    assert first.startswith("vessel-all: what the Transformer adds to the rest of the score")
     assert "something in AUROC (+4.00 [+3.00, +5.00] points at strength 0.25)" in first
     assert "the median delay (-0.04 [-0.05, -0.03] s at strength 0.25)" in first
     assert "no difference beyond the 95 % interval in AUROC (at strength 1)" in first

@@ -9,6 +9,8 @@ from odisar.config.simulators import FleetConfig, LevelRange, VesselSimulatorCon
 from odisar.simulators.vessel.fleet import plan_fleet
 from odisar.simulators.vessel.voyage import draw_voyage
 
+COMPONENTS = ("wind", "waves", "current")
+
 
 def test_the_shipped_fleet_has_the_planned_sizes(vessel):
     plans = plan_fleet(vessel)
@@ -17,6 +19,9 @@ def test_the_shipped_fleet_has_the_planned_sizes(vessel):
     disturbed = Counter((p.split, p.components) for p in plans if p.disturbance != "none")
     assert disturbed == {
         ("development", "all"): 132,
+        ("development", "wind"): 11,
+        ("development", "waves"): 11,
+        ("development", "current"): 11,
         ("test", "all"): 132,
         ("test", "wind"): 11,
         ("test", "waves"): 11,
@@ -31,6 +36,7 @@ def test_names_are_unique(vessel):
         "train-random-low-2",
         "test-zigzag-10-case-1-s0.25",
         "test-turning-20-case-3-wind-s0.5",
+        "development-turning-20-case-3-wind-s0.5",
         "test-zigzag-10-clean-1",
     } <= set(names)
 
@@ -41,6 +47,38 @@ def test_a_seed_is_shared_by_strengths_and_components_of_one_run_only(vessel):
             plan.name if plan.disturbance == "none" else plan.name[: plan.name.index("case-") + 6]
         )
         assert plan.seed_name == stem
+
+
+def test_development_has_components_apart_as_test_does_with_other_seeds(vessel):
+    apart = {
+        split: [p for p in plan_fleet(vessel) if p.split == split and p.components in COMPONENTS]
+        for split in ("development", "test")
+    }
+
+    def what(plans):
+        return [(p.maneuver, p.variant, p.disturbance, p.components, p.strength) for p in plans]
+
+    assert what(apart["development"]) == what(apart["test"])
+    seeds = [{plan.seed_name for plan in plans} for plans in apart.values()]
+    assert len(seeds[0]) == len(seeds[1]) == 11
+    assert not seeds[0] & seeds[1]
+
+
+@pytest.mark.parametrize("kept", [(), ("test",), ("development",)])
+def test_leaving_components_apart_out_changes_no_other_run(vessel, kept):
+    every = plan_fleet(vessel)
+    one_component = {split: vessel.fleet.one_component[split] for split in kept}
+    fleet = vessel.fleet.model_copy(update={"one_component": one_component})
+    fewer = plan_fleet(vessel.model_copy(update={"fleet": fleet}))
+    assert fewer == [p for p in every if p.components not in COMPONENTS or p.split in kept]
+    assert len(every) - len(fewer) == 33 * (2 - len(kept))
+
+
+def test_other_splits_have_no_components_apart(vessel):
+    fields = vessel.fleet.model_dump()
+    fields["one_component"]["calibration"] = fields["one_component"]["test"]
+    with pytest.raises(ValidationError, match="one_component"):
+        FleetConfig.model_validate(fields)
 
 
 def test_random_only_calibration_has_more_than_six_hours(vessel):

@@ -7,16 +7,20 @@ import numpy as np
 import pytest
 
 from odisar.baselines.range_rule import range_rule_scores
+from odisar.capability.combined import ScoreSteps
+from odisar.capability.innovations import InnovationSteps
+from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.scoring import DETECTORS, RecordingScores, Scorer
 from odisar.config.cases import RangeRule
 from odisar.config.loader import load_config
-from odisar.config.score import ScoreConfig, StatisticsConfig
+from odisar.config.score import ScoreConfig
 from odisar.recordings.schema import Recording, RecordingInfo
 from odisar.stages.detectors import (
     MemberDetectors,
     fit_innovation_scores,
     fit_relations,
     member_reference,
+    score_steps,
 )
 from odisar.stages.members import MemberData
 from small_bundle import small_case
@@ -38,6 +42,28 @@ def data(trained_twin) -> MemberData:
         splits=splits,
         scaler=trained_twin.scaler,
         spec=trained_twin.spec,
+    )
+
+
+def other_windows() -> ScoreConfig:
+    """Return windows that are all told apart."""
+    return ScoreConfig.model_validate(
+        {
+            "innovation": {
+                "mean_steps": 7,
+                "size_steps": 3,
+                "recent_steps": 2,
+                "recent_share": 0.2,
+            },
+            "consistency": {
+                "mean_steps": 4,
+                "size_steps": 5,
+                "recent_steps": 1,
+                "recent_share": 0.4,
+            },
+            "scatter": {"steps": 6, "share": 0.1},
+            "noise": {"lasting_steps": 8, "recent_steps": 9, "recent_share": 0.6, "margin": 0.7},
+        }
     )
 
 
@@ -117,11 +143,9 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     data, trained_twin
 ):
     scorer = Scorer(trained_twin, 64, "cpu")
-    own = StatisticsConfig(mean_steps=7, size_steps=3, recent_steps=2, recent_share=0.2)
-    tied = StatisticsConfig(mean_steps=4, size_steps=5, recent_steps=1, recent_share=0.4)
-    score = ScoreConfig(innovation=own, consistency=tied)
-    case = data.case.model_copy(update={"score": score})
-    fitted = fit_innovation_scores(scorer, replace(data, case=case))
+    case = data.case.model_copy(update={"score": other_windows()})
+    whole = fit_innovation_scores(scorer, replace(data, case=case))
+    fitted = whole.parts
     assert (fitted.consistency.mean.steps, fitted.consistency.size.steps) == (4, 5)
     assert fitted.consistency.reconstruction is None
     held_out = [
@@ -130,6 +154,7 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     assert fitted.share_holding == fitted.relations.share_holding(np.concatenate(held_out))
     assert (fitted.twin.mean.steps, fitted.closed_form.size.steps) == (7, 3)
     assert (fitted.twin.recent.steps, fitted.closed_form.recent_share) == (2, 0.2)
+    assert (fitted.scatter.closed_form.steps, fitted.scatter.share) == (6, 0.1)
     assert fitted.twin.reconstruction is not None
     assert fitted.closed_form.reconstruction is None
     validation = [
@@ -138,6 +163,28 @@ def test_innovation_scores_are_fitted_on_validation_recordings_from_their_second
     moment = sum(run.T @ run for run in validation) / sum(map(len, validation))
     np.testing.assert_allclose(fitted.twin.size.precision, np.linalg.inv(moment), rtol=1e-4)
     assert not np.allclose(fitted.twin.size.precision, fitted.closed_form.size.precision, rtol=1e-3)
+
+
+def test_the_steps_of_a_score_are_those_that_its_case_asks_for():
+    assert score_steps(other_windows()) == ScoreSteps(
+        innovation=InnovationSteps(mean=7, size=3, recent=2, recent_share=0.2),
+        consistency=InnovationSteps(mean=4, size=5, recent=1, recent_share=0.4),
+        scatter=6,
+        scatter_share=0.1,
+        noise=NoiseSteps(lasting=8, recent=9, recent_share=0.6, margin=0.7),
+    )
+
+
+def test_noise_is_fitted_on_validation_recordings_by_the_closed_forms_precision(data, trained_twin):
+    case = data.case.model_copy(update={"score": other_windows()})
+    scorer = Scorer(trained_twin, 64, "cpu")
+    fitted = fit_innovation_scores(scorer, replace(data, case=case))
+    squares = [
+        run.outliers(fitted.parts.closed_form.size.precision)
+        for item in data.splits["validation"]
+        for run in scorer.runs(item, scorer.score(item, short_lead_steps=3))
+    ]
+    assert fitted.noise == SensorNoise.fit(squares, NoiseSteps(8, 9, 0.6, 0.7))
 
 
 def test_relations_are_fitted_on_training_recordings(data, trained_twin):

@@ -3,11 +3,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from odisar.capability.combined import InnovationScores
-from odisar.capability.consistency import Consistency
+from invented_scores import invented_scores
 from odisar.capability.distribution import NoiseFloor
 from odisar.capability.innovation_values import InnovationScoreValues
-from odisar.capability.innovations import InnovationScore, InnovationSteps
 from odisar.capability.recalibration import Recalibration
 from odisar.config.loader import ConfigView, load_config
 from odisar.evaluation.alarms import calibrate_operating_threshold
@@ -29,13 +27,6 @@ def config(request):
     return read_config(request.config.rootpath)
 
 
-def innovation_values() -> InnovationScoreValues:
-    runs = [np.random.default_rng(0).normal(size=(50, 2))]
-    score = InnovationScore.fit(runs, None, InnovationSteps(3, 2, 1, 0.3))
-    relations = Consistency.fit(np.concatenate(runs), (0,))
-    return InnovationScoreValues.of(InnovationScores(score, score, score, relations, 1.0))
-
-
 def calibration(number: int, *, hours: float, sigma: float = 1.0) -> MemberCalibration:
     """Return a fold calibrated on block ``number`` and tested on the block before it.
 
@@ -43,7 +34,7 @@ def calibration(number: int, *, hours: float, sigma: float = 1.0) -> MemberCalib
     """
     scores = sigma * np.abs(np.random.default_rng(number).normal(size=2000))
     return MemberCalibration(
-        innovation=innovation_values(),
+        innovation=InnovationScoreValues.of(invented_scores()),
         runs={name: [(f"block-{number}", scores)] for name in ("odisar", "reconstruction")},
         sigma={"odisar": sigma, "reconstruction": 2 * sigma},
         log_sigma={"odisar": 1.1 * sigma, "reconstruction": 2.2 * sigma},

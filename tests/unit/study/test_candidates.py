@@ -8,19 +8,24 @@ import pytest
 
 from odisar.capability.scoring import Scorer
 from odisar.stages.members import MemberData
-from odisar.study.candidates import candidates
+from odisar.study.candidates import MARGINS, NOISE, candidates
 from odisar.study.development import fit_statistics, ranked
 from small_bundle import small_case
 from small_system import make_recording
 
 MEAN, SIZE, REBUILT = "T2 of mean over 10", "log NIS over 5", "reconstruction"
 RECENT = "T2 of mean over 3"
+WHOLE = (
+    "largest of limited mean over 20, size of one state over 3, reconstruction; "
+    "recent mean over 5 (.7, .3); mean with closed form and consistency (size over 10)"
+)
+WITH_SCATTER = [11.605 / 3 + 0.3375, 8.36 / 3 + 0.44 + 0.225, 9.13 / 3 + 1.1]
 
 
 def judged(*rows):
-    """Return a table of (candidate, set-up, AUROC, TNR@TPR95), all of the twin but `free`."""
+    """Return a table of (candidate, set-up, AUROC, TNR@TPR95), all to choose from but `free`."""
     table = pd.DataFrame(rows, columns=["candidate", "setup", "auroc", "tnr_at_tpr95"])
-    return table.assign(uses_twin=table.candidate != "free")
+    return table.assign(can_be_chosen=table.candidate != "free")
 
 
 def test_the_mean_is_over_the_cells_of_a_set_up_and_ranks_are_its_own():
@@ -46,9 +51,29 @@ def test_what_does_not_use_the_twin_is_compared_and_not_ranked():
     assert table.set_index("candidate")["rank"].dropna().to_dict() == {"high": 1, "low": 2}
     assert table.set_index("candidate").rule_mean["free"] == 1.0
     free = [one for one in candidates() if not one.uses_twin]
-    assert {one.parts for one in free} == {1, 6}
+    assert {one.parts for one in free} == {1, 6, 7}
     for one in free:
         assert one.name.startswith(("no twin", "closed form's", "parity residuals'"))
+
+
+def test_only_what_uses_the_twin_and_has_noise_beside_can_be_chosen():
+    for one in candidates():
+        beside = "; or noise of one sensor, " in one.name
+        assert one.can_be_chosen == beside == (one.noise_margin is not None)
+        assert one.uses_twin or not beside
+        if beside:
+            assert float(one.name.rpartition(", ")[2]) == one.noise_margin
+    margins = [one.noise_margin for one in candidates() if one.can_be_chosen]
+    assert set(margins) == set(MARGINS)
+
+
+def test_what_has_noise_beside_stands_in_the_table_without_it_too():
+    every = {one.name: one for one in candidates()}
+    for one in every.values():
+        if one.can_be_chosen:
+            alone = every[one.name.partition("; or noise")[0]]
+            assert (alone.parts, alone.can_be_chosen) == (one.parts - 2, False)
+            np.testing.assert_array_equal(alone.of(invented()), one.of(invented()))
 
 
 @pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])
@@ -100,10 +125,7 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
             [7.65, 7.6, 8.3],
         ),
         (
-            (
-                "largest of limited mean over 20, size of one state over 3, reconstruction; "
-                "recent mean over 5 (.7, .3); mean with closed form and consistency (size over 10)"
-            ),
+            WHOLE,
             10,
             # (9.9 + 5.4 + .6 * 9 + .4 * 1) / 3 and so on.
             [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0],
@@ -116,6 +138,17 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
             6,
             [5.6, 5.6, 7.4],
         ),
+        # .55 times the mean and .45 times (.5 + 1) / 2, (1 + 0) / 2, (-1 + 1) / 2.
+        (f"{WHOLE}; scatter over 60 (0.45)", 12, WITH_SCATTER),
+        # .8 times and .2 times the same.
+        (
+            f"{WHOLE}; scatter over 20 (0.2)",
+            12,
+            [16.88 / 3 + 0.15, 12.16 / 3 + 0.64 + 0.1, 13.28 / 3 + 1.6],
+        ),
+        # Noise is held against the mean where both are on one scale (see test_development).
+        (f"{WHOLE}; or noise of one sensor, 0.3", 12, [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0]),
+        (f"{WHOLE}; scatter over 60 (0.45); or noise of one sensor, 0", 14, WITH_SCATTER),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -134,6 +167,10 @@ def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
         "parity residuals' T2 of mean over 1": np.array([1.0, 0.0, 0.0]),
         "size of one state over 3": np.array([12.0, 1.0, 1.0]),
         "size of one state over 10": np.array([4.0, 1.0, 1.0]),
+        "size of one state over 60": np.array([0.5, 2.0, -1.0]),
+        "closed form's size of one state over 60": np.array([4.0, 0.0, 1.0]),
+        "size of one state over 20": np.array([0.5, 2.0, -1.0]),
+        "closed form's size of one state over 20": np.array([4.0, 0.0, 1.0]),
     }
     one = next(one for one in candidates() if one.name == name)
     assert one.parts == parts
@@ -161,14 +198,15 @@ def test_every_statistic_is_made_and_none_knows_what_comes_later(relative_twin):
 
     held_out = [score(make_recording(f"held-out-{i}", 200)) for i in range(2)]
     makers = fit_statistics(data, scorer, held_out)
-    assert set(makers) == {one.name for one in candidates() if one.parts == 1}
-    whole = make_recording("test", 120)
-    ended = replace(whole, time_s=whole.time_s[:80], values=whole.values[:80], segments=())
+    assert set(makers) == {NOISE} | {one.name for one in candidates() if one.parts == 1}
+    whole = make_recording("test", 160)
+    ended = replace(whole, time_s=whole.time_s[:120], values=whole.values[:120], segments=())
     for name, make in makers.items():
         long, short = make(*score(whole)), make(*score(ended))
         known = np.isfinite(short)
-        # 21 samples before the first forecast of a sample, and at most 20 that are averaged.
-        assert known[41:].all(), name
+        # Of the windows the first has no innovation; at most 60 are averaged.
+        assert known[60:].all(), name
+        assert known.size == 100
         np.testing.assert_allclose(long[: len(short)], short, atol=1e-3, err_msg=name)
 
 

@@ -1,0 +1,40 @@
+"""The monitor's score fitted on random numbers: no twin has a part in it."""
+
+from functools import partial
+
+import numpy as np
+
+from odisar.capability.combined import InnovationScores, Run, ScoreSteps
+from odisar.capability.consistency import Consistency
+from odisar.capability.innovations import InnovationSteps, conditional_squares
+from odisar.capability.outliers import NoiseSteps
+from odisar.seeding import generator
+
+STATES = (0, 1)
+STEPS = ScoreSteps(
+    innovation=InnovationSteps(mean=6, size=4, recent=2, recent_share=0.25),
+    consistency=InnovationSteps(mean=8, size=4, recent=2, recent_share=0.25),
+    scatter=7,
+    scatter_share=0.15,
+    noise=NoiseSteps(lasting=5, recent=2, recent_share=0.4, margin=0.3),
+)
+
+
+def invented_run(stream: str, samples: int = 200) -> Run:
+    """Return a run of two states and a command, which says one of them."""
+    random = generator(5, stream)
+    innovations, closed_form, wrong = random.normal(size=(3, samples, len(STATES)))
+    # One that stands out, so that the limit counts.
+    innovations[50:51] *= 20
+    innovations[0] = closed_form[0] = wrong[:2] = np.nan
+    seen = random.normal(size=(samples, len(STATES) + 1)).astype(np.float32)
+    seen[:, 1] += 4 * seen[:, 2]
+    errors = np.exp(random.normal(size=samples))
+    return Run(innovations, closed_form, seen, errors, partial(conditional_squares, wrong))
+
+
+def invented_scores(steps: ScoreSteps = STEPS) -> InnovationScores:
+    """Return scores fitted on two runs; one relation of two holds."""
+    runs = [invented_run("values"), invented_run("more", 150)]
+    relations = Consistency.fit(np.concatenate([run.samples for run in runs]), STATES)
+    return InnovationScores.fit(runs, relations, steps)

@@ -1,0 +1,178 @@
+"""The monitor's score: the mean of its parts, or the noise of one sensor, whichever is rarer."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from invented_scores import STEPS, invented_run, invented_scores
+from odisar.capability.combined import (
+    CLOSED_FORM,
+    CONSISTENCY,
+    ODISAR,
+    WITHOUT_TRANSFORMER,
+    InnovationScores,
+    MeanParts,
+    Run,
+)
+from odisar.capability.consistency import Consistency
+from odisar.capability.innovations import LogScale
+from odisar.capability.outliers import NoiseSteps, SensorNoise
+from odisar.recordings.schema import Recording
+from odisar.seeding import generator
+from small_innovations import STEPS as SMALL_STEPS
+from small_innovations import runs_of
+from small_system import make_gusty
+
+#: Which scale the mean of a detector is put on.
+SCALES = {ODISAR: "scale", WITHOUT_TRANSFORMER: "scale_without"}
+
+
+@pytest.fixture(scope="module")
+def scores() -> InnovationScores:
+    return invented_scores()
+
+
+def noise_of(scores: InnovationScores, run: Run) -> np.ndarray:
+    return scores.noise.score(run.outliers(scores.parts.closed_form.size.precision))
+
+
+def with_outliers(run: Run, square: float) -> Run:
+    """Return the run with the same square everywhere, whatever the precision."""
+    return replace(run, outliers=lambda _: np.full(run.innovations.shape, square))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
+def test_the_mean_is_the_weighed_geometric_one_of_three_parts(scores, share):
+    parts = replace(scores.parts, share_holding=share, scatter=None)
+    run = invented_run("both", 50)
+    found = parts.of(run)
+    twin = parts.twin.score(run.innovations, run.reconstruction)
+    closed = parts.closed_form.score(run.closed_form, run.reconstruction)
+    residuals = parts.relations.residuals(run.samples)
+    tied = parts.consistency.score(residuals, run.reconstruction)
+    np.testing.assert_array_equal(found[CLOSED_FORM], closed)
+    np.testing.assert_array_equal(found[CONSISTENCY], tied)
+    whole = (twin * closed * tied**share) ** (1 / (2 + share)) if share else np.sqrt(twin * closed)
+    np.testing.assert_allclose(found[ODISAR], whole)
+    wanted = (closed * tied**share) ** (1 / (1 + share)) if share else closed
+    np.testing.assert_allclose(found[WITHOUT_TRANSFORMER], wanted)
+    assert parts.known_after_steps == (8 if share else 6)
+
+
+@pytest.mark.parametrize("name", [ODISAR, WITHOUT_TRANSFORMER])
+def test_the_whole_is_the_larger_of_the_mean_and_noise_on_one_log_scale(scores, name):
+    run = invented_run("fresh", 400)
+    mean = getattr(scores, SCALES[name]).of(scores.parts.of(run)[name])
+    noise = noise_of(scores, run)
+    found = scores.of(run)[name]
+    np.testing.assert_allclose(found, np.exp(np.maximum(mean, noise)), rtol=1e-5)
+    # Each of them counts at times.
+    assert {True, False} == set((noise > mean)[scores.known_after_steps :])
+    assert found.dtype == np.float32
+
+
+def test_noise_raises_the_whole_and_neither_the_closed_form_nor_consistency(scores):
+    calm = scores.of(with_outliers(invented_run("fresh"), 0.0))
+    loud = scores.of(with_outliers(invented_run("fresh"), 1e4))
+    known = slice(scores.known_after_steps, None)
+    for name in SCALES:
+        assert (loud[name][known] > 2 * calm[name][known]).all()
+    for name in (CLOSED_FORM, CONSISTENCY):
+        np.testing.assert_array_equal(loud[name], calm[name])
+
+
+def test_whatever_a_sensor_reads_the_whole_stays_a_number(scores):
+    run = invented_run("fresh")
+    extreme = replace(run, innovations=1e150 * run.innovations, closed_form=1e150 * run.closed_form)
+    known = slice(scores.known_after_steps, None)
+    for name in SCALES:
+        assert np.isfinite(scores.of(extreme)[name][known]).all()
+        assert scores.of(extreme)[name][known].min() > scores.of(run)[name][known].max()
+
+
+def test_the_filter_is_asked_with_the_precision_of_the_closed_forms_innovations(scores):
+    asked, run = [], invented_run("fresh")
+
+    def outliers(precision: np.ndarray) -> np.ndarray:
+        asked.append(precision)
+        return run.outliers(precision)
+
+    scores.of(replace(run, outliers=outliers))
+    InnovationScores.fit([replace(run, outliers=outliers)], scores.parts.relations, STEPS)
+    fitted = MeanParts.fit([run], scores.parts.relations, STEPS)
+    wanted = [scores.parts.closed_form.size.precision, fitted.closed_form.size.precision]
+    np.testing.assert_array_equal(asked, wanted)
+    assert not np.allclose(wanted[0], scores.parts.twin.size.precision)
+
+
+def test_on_what_it_was_fitted_to_the_mean_is_usually_zero_and_rarely_one(scores):
+    held_out = [invented_run("values"), invented_run("more", 150)]
+    for name, scale in SCALES.items():
+        means = np.concatenate([scores.parts.of(run)[name] for run in held_out])
+        assert getattr(scores, scale) == LogScale.fit(means)
+        found = getattr(scores, scale).of(means[np.isfinite(means)])
+        np.testing.assert_allclose(np.quantile(found, [0.5, 0.99]), [0, 1], atol=0.02)
+    noise = [run.outliers(scores.parts.closed_form.size.precision) for run in held_out]
+    assert scores.noise == SensorNoise.fit(noise, STEPS.noise)
+
+
+def test_the_share_is_that_of_relations_which_hold_on_held_out_recordings(scores):
+    assert scores.parts.share_holding == 0.5
+    held_out = [invented_run("values"), invented_run("more", 150)]
+    samples = np.concatenate([run.samples for run in held_out])
+    assert scores.parts.share_holding == scores.parts.relations.share_holding(samples)
+
+
+@pytest.mark.parametrize(
+    ("lasting", "scatter", "known_after"), [(5, 7, 8), (12, 7, 13), (5, 11, 11)]
+)
+def test_the_first_score_is_known_when_every_part_is(lasting, scatter, known_after):
+    noise = NoiseSteps(lasting, 2, recent_share=0.4, margin=0.3)
+    steps = replace(STEPS, scatter=scatter, noise=noise)
+    fitted = invented_scores(steps)
+    found = fitted.of(invented_run("fresh", 40))
+    assert fitted.known_after_steps == known_after
+    known = np.isfinite(found[ODISAR])
+    assert known[known_after:].all()
+    assert not known[: known_after - 1].any()
+
+
+@pytest.fixture(scope="module")
+def monitor(gusty_twin) -> InnovationScores:
+    """Return scores of the gusty machine that listen to noise over 20 samples."""
+    runs = runs_of(gusty_twin, [make_gusty(f"held-out-{i}") for i in range(8)])
+    samples = np.concatenate([run.samples for run in runs])
+    relations = Consistency.fit(samples, gusty_twin.network.state_features)
+    noise = NoiseSteps(lasting=20, recent=5, recent_share=0.3, margin=0.0)
+    return InnovationScores.fit(runs, relations, replace(SMALL_STEPS, noise=noise))
+
+
+def noisy(channel: int) -> Iterator[Recording]:
+    """Yield recordings one of whose sensors scatters as much as most gusts push."""
+    for number in range(6):
+        base = make_gusty(f"noisy-{number}")
+        values = base.values.copy()
+        values[:, channel] += 0.1 * generator(3, "noise", str(number)).normal(size=len(values))
+        yield replace(base, values=values)
+
+
+@pytest.mark.parametrize("channel", [1, 2])
+def test_the_monitor_hears_a_noisy_sensor_that_the_mean_of_its_parts_misses(
+    gusty_twin, monitor, channel
+):
+    usual = [make_gusty(f"usual-{i}") for i in range(6)]
+    faulty = runs_of(gusty_twin, noisy(channel))
+    missed = [monitor.scale.of(monitor.parts.of(run)[ODISAR]) for run in faulty]
+    heard = [np.log(monitor.of(run)[ODISAR]) for run in faulty]
+    false = [np.log(monitor.of(run)[ODISAR]) for run in runs_of(gusty_twin, usual)]
+    assert share_of_rare(missed) < 0.1
+    assert share_of_rare(heard) > 0.6
+    assert share_of_rare(false) < 0.05
+
+
+def share_of_rare(logs: list[np.ndarray]) -> float:
+    """Return the share of known scores that are rarer than one in a hundred."""
+    known = np.concatenate(logs)
+    return float(np.mean(known[np.isfinite(known)] > 1))

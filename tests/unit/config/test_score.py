@@ -1,0 +1,57 @@
+"""Which windows and weights a score may be declared with."""
+
+import copy
+
+import pytest
+from pydantic import ValidationError
+
+from odisar.config.loader import load_config
+from odisar.config.score import ScoreConfig
+from small_system import SCORE
+
+
+@pytest.fixture
+def score():
+    return copy.deepcopy(SCORE)
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value"),
+    [
+        ("noise", "margin", -0.1),
+        ("noise", "lasting_steps", 0),
+        ("noise", "recent_steps", 0),
+        ("noise", "recent_share", 1.0),
+        ("scatter", "steps", 0),
+        ("scatter", "share", -0.1),
+        ("scatter", "share", 1.0),
+        ("innovation", "recent_share", 1.0),
+        ("consistency", "recent_share", 1.0),
+        ("consistency", "share", 0.1),
+    ],
+)
+def test_what_can_be_no_window_or_weight_is_refused_where_it_stands(score, part, key, value):
+    score[part] = score[part] | {key: value}
+    with pytest.raises(ValidationError, match=rf"{part}\.{key}"):
+        ScoreConfig.model_validate(score)
+
+
+@pytest.mark.parametrize(("part", "key"), [(part, key) for part in SCORE for key in SCORE[part]])
+def test_no_window_or_weight_has_a_default(score, part, key):
+    del score[part][key]
+    with pytest.raises(ValidationError, match=rf"{part}\.{key}"):
+        ScoreConfig.model_validate(score)
+
+
+@pytest.mark.parametrize(("part", "key"), [("noise", "margin"), ("scatter", "share")])
+def test_no_margin_and_no_scatter_are_declared_by_zero(score, part, key):
+    score[part][key] = 0.0
+    assert getattr(getattr(ScoreConfig.model_validate(score), part), key) == 0
+
+
+def test_every_shipped_case_listens_to_its_sensors(request):
+    cases = load_config(request.config.rootpath).cases
+    assert len(cases) == 4
+    for case in cases.values():
+        assert case.score.noise.lasting_steps > case.score.noise.recent_steps
+        assert case.score.scatter.steps > case.score.innovation.size_steps
