@@ -8,13 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odisar.capability.consistency import Consistency
-from odisar.capability.innovations import FloatArray, InnovationScore, InnovationSteps, LogScale
+from odisar.capability.innovations import (
+    FloatArray,
+    InnovationScore,
+    InnovationSize,
+    InnovationSteps,
+    LogScale,
+)
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 
 #: The monitor's score, and the same without its Transformer.
 ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
 #: What these are made of: innovations of the closed form, parity residuals.
 CLOSED_FORM, CONSISTENCY = "closed-form", "consistency"
+_OF_CLOSED_FORM = (WITHOUT_TRANSFORMER, CLOSED_FORM)
+
+#: Scatter counts no more than this, what is rare, on the common log scale.
+SATURATED = 1.0
 
 
 @dataclass(frozen=True)
@@ -39,18 +49,48 @@ class ScoreSteps:
 
     innovation: InnovationSteps
     consistency: InnovationSteps
+    scatter: int
+    scatter_share: float
     noise: NoiseSteps
 
 
 @dataclass(frozen=True)
-class MeanParts:
-    """Scores of innovations, the twin's and its closed form's, and of parity residuals.
+class Scatter:
+    """How much innovations scatter over many samples, where a little more than usual adds up.
 
-    The monitor's mean is the geometric one of the three. They err for different reasons: the
-    Transformer where it has learnt too little or what it shouldn't, the closed form where things
-    are not linear, both where a fault has been in their past for a while, and the ``relations``
-    within a sample, whose residuals ``consistency`` judges, wherever only time would tell. The last
-    one's weight is the share of states whose relation holds (``share_holding``).
+    Sizes of the ``twin``'s innovations and of the ``closed_form``'s, which have weight ``share`` in
+    the monitor's mean. They count no more than what is rare: they remember for long, and must not
+    keep up an alarm about what is over.
+    """
+
+    twin: InnovationSize
+    closed_form: InnovationSize
+    share: float
+
+    @property
+    def known_after_steps(self) -> int:
+        """How many steps after its first forecast a run has its first value."""
+        return max(self.twin.steps, self.closed_form.steps)
+
+    def of(self, run: Run) -> tuple[FloatArray, FloatArray]:
+        """Return (window,) of the twin and of the closed form, on their common log scale."""
+        pairs = ((self.twin, run.innovations), (self.closed_form, run.closed_form))
+        twin, closed = (
+            np.minimum(size.scale.of(size.statistic(values)), SATURATED) for size, values in pairs
+        )
+        return twin, closed
+
+
+@dataclass(frozen=True)
+class MeanParts:
+    """Scores of innovations, the twin's and its closed form's, of parity residuals, of scatter.
+
+    The monitor's mean is the geometric one. Its parts err for different reasons: the Transformer
+    where it has learnt too little or what it shouldn't, the closed form where things are not
+    linear, both where a fault has been in their past for a while, and the ``relations`` within a
+    sample, whose residuals ``consistency`` judges, wherever only time would tell. The last one's
+    weight is the share of states whose relation holds (``share_holding``), where that of the first
+    two is 1. ``scatter`` stands beside these three, or is left out.
     """
 
     twin: InnovationScore
@@ -58,37 +98,54 @@ class MeanParts:
     consistency: InnovationScore
     relations: Consistency
     share_holding: float
+    scatter: Scatter | None
 
     @classmethod
     def fit(cls, runs: Sequence[Run], relations: Consistency, steps: ScoreSteps) -> Self:
         """Fit on runs of held-out recordings; ``relations`` come from those for training."""
         rebuilt = [run.reconstruction for run in runs]
         residuals = [relations.residuals(run.samples) for run in runs]
+        twin, closed = [run.innovations for run in runs], [run.closed_form for run in runs]
+        scatter = None
+        if steps.scatter_share:
+            of_twin, of_closed = (InnovationSize.fit(v, steps.scatter) for v in (twin, closed))
+            scatter = Scatter(of_twin, of_closed, steps.scatter_share)
         return cls(
-            InnovationScore.fit([run.innovations for run in runs], rebuilt, steps.innovation),
-            InnovationScore.fit([run.closed_form for run in runs], None, steps.innovation),
+            InnovationScore.fit(twin, rebuilt, steps.innovation),
+            InnovationScore.fit(closed, None, steps.innovation),
             InnovationScore.fit(residuals, None, steps.consistency),
             relations,
             relations.share_holding(np.concatenate([run.samples for run in runs])),
+            scatter,
         )
 
     @property
     def known_after_steps(self) -> int:
         """How many steps after its first forecast a run has its first score."""
-        tied = [self.consistency] if self.share_holding else []
-        return max(part.known_after_steps for part in (self.twin, self.closed_form, *tied))
+        counted = [self.twin.known_after_steps, self.closed_form.known_after_steps]
+        if self.share_holding:
+            counted.append(self.consistency.known_after_steps)
+        if self.scatter is not None:
+            counted.append(self.scatter.known_after_steps)
+        return max(counted)
 
     def of(self, run: Run) -> dict[str, FloatArray]:
         """Return (window,) scores along one gapless run by the detector that they belong to."""
         twin = self.twin.score(run.innovations, run.reconstruction)
         closed = self.closed_form.score(run.closed_form, run.reconstruction)
         tied = self.consistency.score(self.relations.residuals(run.samples), run.reconstruction)
-        return {
+        made = {
             ODISAR: _geometric_mean((twin, 1.0), (closed, 1.0), (tied, self.share_holding)),
             WITHOUT_TRANSFORMER: _geometric_mean((closed, 1.0), (tied, self.share_holding)),
             CLOSED_FORM: closed,
-            CONSISTENCY: tied,
         }
+        if self.scatter is not None:
+            of_twin, of_closed = map(np.exp, self.scatter.of(run))
+            both = _geometric_mean((of_twin, 1.0), (of_closed, 1.0))
+            share = self.scatter.share
+            for name, scatter in ((ODISAR, both), *((n, of_closed) for n in _OF_CLOSED_FORM)):
+                made[name] = _geometric_mean((made[name], 1 - share), (scatter, share))
+        return made | {CONSISTENCY: tied}
 
 
 @dataclass(frozen=True)

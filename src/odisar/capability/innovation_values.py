@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from odisar.capability.combined import InnovationScores, MeanParts
+from odisar.capability.combined import InnovationScores, MeanParts, Scatter
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
@@ -73,8 +73,6 @@ class InnovationValues(Section):
     recent: MeanValues
     recent_share: Annotated[float, Field(ge=0, lt=1)]
     reconstruction: ScaleValues | None
-    long: StatisticValues | None
-    long_share: Annotated[float, Field(ge=0, lt=1)]
 
     @classmethod
     def of(cls, score: InnovationScore) -> Self:
@@ -86,8 +84,6 @@ class InnovationValues(Section):
             recent=_mean_values(score.recent),
             recent_share=score.recent_share,
             reconstruction=None if rebuilt is None else ScaleValues(**vars(rebuilt)),
-            long=None if score.long is None else StatisticValues(**_values(score.long)),
-            long_share=score.long_share,
         )
 
     def build(self) -> InnovationScore:
@@ -99,8 +95,6 @@ class InnovationValues(Section):
             _mean(self.recent),
             self.recent_share,
             None if rebuilt is None else LogScale(**rebuilt.model_dump()),
-            None if self.long is None else InnovationSize(**_arguments(self.long)),
-            self.long_share,
         )
 
 
@@ -117,6 +111,26 @@ class RelationValues(Section):
         if len({len(row) for row in self.weights}) > 1:
             raise ValueError("weights: expected as many numbers in each row")
         return self
+
+
+class ScatterValues(Section):
+    """The scatter over many samples, and its share of the mean."""
+
+    twin: StatisticValues
+    closed_form: StatisticValues
+    share: Annotated[float, Field(gt=0, lt=1)]
+
+    @classmethod
+    def of(cls, scatter: Scatter) -> Self:
+        """Return the numbers of a fitted score."""
+        sizes = (scatter.twin, scatter.closed_form)
+        twin, closed = (StatisticValues(**_values(size)) for size in sizes)
+        return cls(twin=twin, closed_form=closed, share=scatter.share)
+
+    def build(self) -> Scatter:
+        """Return the score."""
+        twin, closed = (InnovationSize(**_arguments(v)) for v in (self.twin, self.closed_form))
+        return Scatter(twin, closed, self.share)
 
 
 class NoiseStepsValues(Section):
@@ -161,6 +175,7 @@ class InnovationScoreValues(Section):
     consistency: InnovationValues
     relations: RelationValues
     share_holding: Annotated[float, Field(ge=0, le=1)]
+    scatter: ScatterValues | None
     noise: NoiseValues
     scale: ScaleValues
     scale_without: ScaleValues
@@ -175,6 +190,7 @@ class InnovationScoreValues(Section):
             consistency=InnovationValues.of(parts.consistency),
             relations=RelationValues(states=list(tied.states), weights=tied.weights.tolist()),
             share_holding=parts.share_holding,
+            scatter=None if parts.scatter is None else ScatterValues.of(parts.scatter),
             noise=NoiseValues.of(scores.noise),
             scale=ScaleValues(**vars(scores.scale)),
             scale_without=ScaleValues(**vars(scores.scale_without)),
@@ -189,6 +205,7 @@ class InnovationScoreValues(Section):
             self.consistency.build(),
             Consistency(tuple(tied.states), np.array(tied.weights)),
             self.share_holding,
+            None if self.scatter is None else self.scatter.build(),
         )
         return InnovationScores(
             parts,
@@ -203,8 +220,9 @@ class InnovationScoreValues(Section):
         parts: list[_Covariant] = []
         for score in (self.twin, self.closed_form, self.consistency):
             parts += [score.mean, score.size, score.recent]
-            parts += [] if score.long is None else [score.long]
             parts += [mean.limit for mean in (score.mean, score.recent) if mean.limit is not None]
+        if self.scatter is not None:
+            parts += [self.scatter.twin, self.scatter.closed_form]
         return {len(part.precision) for part in parts}
 
 

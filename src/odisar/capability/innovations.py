@@ -29,9 +29,6 @@ _SHRINKAGE = 1.0e-6
 _USUAL, _RARE = 0.5, 0.99
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
-#: The size over many innovations counts no more than this, what is rare, on the common log scale:
-#: it remembers for long, and must not keep up an alarm about what is over.
-SATURATED = 1.0
 #: Below it a statistic is called zero; its log must stay finite.
 _SMALLEST = 1.0e-12
 
@@ -203,16 +200,14 @@ class InnovationSize:
 class InnovationSteps:
     """How the score is put together (``score`` of a case in params.yaml).
 
-    ``mean``, ``size``, ``recent`` and ``long`` are numbers of innovations, ``recent_share`` and
-    ``long_share`` the weights of the last two statistics. Without a weight there is no long one.
+    ``mean``, ``size`` and ``recent`` are numbers of innovations, ``recent_share`` is the weight of
+    the last statistic.
     """
 
     mean: int
     size: int
     recent: int
     recent_share: float
-    long: int = 0
-    long_share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -223,9 +218,7 @@ class InnovationScore:
     The largest of T2 of the mean innovation, the size of the innovations of the state that scatters
     most and, where there is one, the reconstruction error of the forecast (``reconstruction`` is
     its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
-    mean of very few innovations, which lets go as soon as a disturbance has ended. With weight
-    ``long_share`` there may be the size over many innovations, in which a little more scatter than
-    usual adds up; it counts no more than ``SATURATED``, as it remembers for long. 1 is what is
+    mean of very few innovations, which lets go as soon as a disturbance has ended. 1 is what is
     usual on held-out recordings, e = 2.7 what is rare. The monitor's is made of three of these (see
     ``combined.InnovationScores``).
     """
@@ -235,14 +228,11 @@ class InnovationScore:
     recent: MeanInnovation
     recent_share: float
     reconstruction: LogScale | None
-    long: InnovationSize | None = None
-    long_share: float = 0.0
 
     @property
     def known_after_steps(self) -> int:
         """How many steps after its first forecast a run has its first score."""
-        parts = (self.mean, self.size, self.recent, self.long)
-        return max(part.steps for part in parts if part is not None)
+        return max(self.mean.steps, self.size.steps, self.recent.steps)
 
     @classmethod
     def fit(
@@ -263,8 +253,6 @@ class InnovationScore:
             MeanInnovation.fit(runs, steps.recent, None),
             steps.recent_share,
             scale,
-            InnovationSize.fit(runs, steps.long) if steps.long_share else None,
-            steps.long_share,
         )
 
     def parts(self, innovations: FloatArray) -> FloatArray:
@@ -282,8 +270,5 @@ class InnovationScore:
         if self.reconstruction is not None:
             lasting = np.maximum(lasting, self.reconstruction.of(reconstruction))
         recent = self.recent.scale.of(self.recent.statistic(innovations))
-        logs = (1 - self.recent_share - self.long_share) * lasting + self.recent_share * recent
-        if self.long is not None:
-            long = self.long.scale.of(self.long.statistic(innovations))
-            logs = logs + self.long_share * np.minimum(long, SATURATED)
-        return np.asarray(np.exp(logs))
+        share = self.recent_share
+        return np.asarray(np.exp((1 - share) * lasting + share * recent))

@@ -1,8 +1,8 @@
 """The windows of the monitor's score: how far back each of its statistics looks."""
 
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from odisar.config.base import NonNegativeFloat, PositiveInt, Section
 
@@ -23,23 +23,14 @@ class StatisticsConfig(Section):
     recent_share: _Weight
 
 
-class InnovationStatisticsConfig(StatisticsConfig):
-    """The same of innovations, with the size over ``long_steps``, which has ``long_share``.
+class ScatterConfig(Section):
+    """Over how many samples innovations' scatter adds up, and its share of the score's mean.
 
-    A little more scatter than usual adds up in it, and it remembers for as long.
+    It remembers for as long. A share of 0 leaves it out.
     """
 
-    long_steps: PositiveInt
-    long_share: _Weight
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.recent_share + self.long_share >= 1:
-            raise ValueError(
-                f"recent_share={self.recent_share:g} and long_share={self.long_share:g} leave no "
-                "weight for the mean and the size: together they must be below 1"
-            )
-        return self
+    steps: PositiveInt
+    share: _Weight
 
 
 class NoiseConfig(Section):
@@ -57,8 +48,9 @@ class NoiseConfig(Section):
 
 
 class ScoreConfig(Section):
-    """Of a case's innovations, the twin's and its closed form's alike, parity residuals, noise."""
+    """Of a case's innovations, the twin's and its closed form's alike, and parity residuals."""
 
-    innovation: InnovationStatisticsConfig
+    innovation: StatisticsConfig
     consistency: StatisticsConfig
+    scatter: ScatterConfig
     noise: NoiseConfig

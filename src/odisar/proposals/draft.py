@@ -207,9 +207,9 @@ def _judging(draft: Draft) -> Iterator[str]:
     guard = max(min(plan.horizon, plan.fault_duration // 4), 1) / rate_hz
     yield line(8, "score:", note="how many samples each statistic looks back")
     tens = {"mean_steps": 10, "size_steps": 10}
-    few = {"recent_steps": 3, "recent_share": 0.3, "long_steps": 20, "long_share": 0.2}
-    yield line(12, f"innovation: {flow(**tens, **few)}")
+    yield line(12, f"innovation: {flow(**tens, recent_steps=3, recent_share=0.3)}")
     yield line(12, f"consistency: {flow(**tens, recent_steps=1, recent_share=0.4)}")
+    yield line(12, f"scatter: {flow(steps=20, share=0.0)}", note="a share for what lasts minutes")
     noise = flow(lasting_steps=10, recent_steps=3, recent_share=0.5, margin=0.3)
     yield line(12, f"noise: {noise}")
     yield line(

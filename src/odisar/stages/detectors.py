@@ -14,7 +14,7 @@ from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps
 from odisar.capability.scoring import RecordingScores, Scorer
-from odisar.config.score import ScoreConfig
+from odisar.config.score import ScoreConfig, StatisticsConfig
 from odisar.recordings.schema import Recording
 from odisar.seeding import derive_seed
 from odisar.stages.members import MemberData
@@ -94,16 +94,17 @@ def fit_relations(data: MemberData, twin: TrainedTwin) -> Consistency:
 
 def score_steps(config: ScoreConfig) -> ScoreSteps:
     """Return how far back a case's score looks."""
-    innovation, tied, noise = config.innovation, config.consistency, config.noise
+    noise = config.noise
     return ScoreSteps(
-        InnovationSteps(
-            innovation.mean_steps,
-            innovation.size_steps,
-            innovation.recent_steps,
-            innovation.recent_share,
-            innovation.long_steps,
-            innovation.long_share,
-        ),
-        InnovationSteps(tied.mean_steps, tied.size_steps, tied.recent_steps, tied.recent_share),
-        NoiseSteps(noise.lasting_steps, noise.recent_steps, noise.recent_share, noise.margin),
+        innovation=_statistics(config.innovation),
+        consistency=_statistics(config.consistency),
+        scatter=config.scatter.steps,
+        scatter_share=config.scatter.share,
+        noise=NoiseSteps(noise.lasting_steps, noise.recent_steps, noise.recent_share, noise.margin),
+    )
+
+
+def _statistics(config: StatisticsConfig) -> InnovationSteps:
+    return InnovationSteps(
+        config.mean_steps, config.size_steps, config.recent_steps, config.recent_share
     )

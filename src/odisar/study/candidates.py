@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from odisar.capability.innovations import SATURATED, FloatArray
+from odisar.capability.combined import SATURATED
+from odisar.capability.innovations import FloatArray
 from odisar.capability.scoring import RECONSTRUCTION
 
 #: Steps of the windows that are tried, and leads of forecasts that are compared with now.
@@ -13,10 +14,10 @@ WINDOWS, LEADS = (1, 3, 5, 10, 20), (5, 10)
 WEIGHTS, SIZES, LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
 #: Of the few last innovations, and of the sizes of parity residuals, that are offered.
 RECENT, _TIED_SIZES = (1, 3, 5), (3, 10)
-#: The size over many innovations: over how many, and its weight.
-LONG = ((20, 0.2), (60, 0.3), (60, 0.45))
+#: The scatter that adds up: over how many innovations, and its share of the mean.
+SCATTER = ((20, 0.2), (60, 0.3), (60, 0.45))
 #: How much further out than the rest the noise of one sensor must be, on the common log scale.
-MARGINS = (0.0, 0.5)
+MARGINS = (0.0, 0.3, 0.75)
 
 #: Before the name of a statistic of the closed form's innovations, of parity residuals.
 CLOSED, PARITY = "closed form's ", "parity residuals' "
@@ -80,16 +81,16 @@ def of_limited() -> list[str]:
 
 
 def many_steps() -> list[int]:
-    """Return over how many innovations a long size is tried."""
-    return sorted({steps for steps, _ in LONG})
+    """Return over how many innovations scatter is tried."""
+    return sorted({steps for steps, _ in SCATTER})
 
 
 def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     """Return the largest of three, of a mean that single innovations can't rule.
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
-    say as well; the last also with the size over many innovations, and with the noise of one
-    sensor beside. In between the same without the twin.
+    say as well; the last also with the scatter that adds up, and with the noise of one sensor
+    beside. In between the same without the twin.
     """
     name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
     name += f"; recent mean over {last} (.7, .3)"
@@ -112,9 +113,15 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
                 uses_twin=False,
             ),
         ]
-    for many, share in LONG:
-        views = [_view(source, steps, size, last, many, share) for source in ("", CLOSED)]
-        made.append(Candidate(f"{whole}; size over {many} ({share:g})", 12, _mean(*views, tied)))
+    for many, share in SCATTER:
+        both = [f"{source}size of one state over {many}" for source in ("", CLOSED)]
+        made.append(
+            Candidate(
+                f"{whole}; scatter over {many} ({share:g})",
+                12,
+                _with_scatter(_mean(alone, closed, tied), both, share),
+            )
+        )
     # Those with every part.
     full = [one for one in made if one.name.startswith(whole)]
     for one in full:
@@ -124,19 +131,20 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     return made
 
 
-def _view(
-    source: str, steps: int, size: int, last: int, many: int = 0, share: float = 0.0
-) -> Callable[[Statistics], FloatArray]:
+def _view(source: str, steps: int, size: int, last: int) -> Callable[[Statistics], FloatArray]:
     """Return what the innovations of one source say: of the twin, or of its closed form."""
     names = [f"T2 of limited mean over {steps}", f"size of one state over {size}"]
     lasting = (*(f"{source}{name}" for name in names), *([] if source else [RECONSTRUCTION]))
+    recent = f"{source}T2 of mean over {last}"
+    return lambda s: 0.7 * _largest(s, lasting) + 0.3 * s[recent]
 
+
+def _with_scatter(
+    mean: Callable[[Statistics], FloatArray], sizes: list[str], share: float
+) -> Callable[[Statistics], FloatArray]:
     def of(s: Statistics) -> FloatArray:
-        logs = (0.7 - share) * _largest(s, lasting) + 0.3 * s[f"{source}T2 of mean over {last}"]
-        if share:
-            long = s[f"{source}size of one state over {many}"]
-            logs = logs + share * np.minimum(long, SATURATED)
-        return logs
+        scatter = np.mean([np.minimum(s[size], SATURATED) for size in sizes], axis=0)
+        return np.asarray((1 - share) * mean(s) + share * scatter)
 
     return of
 
