@@ -103,25 +103,21 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
         tied = _tied(tied_size)
         label = f"consistency (size over {tied_size})"
         whole = f"{name}; mean with closed form and {label}"
+        without = (
+            f"no twin: closed form's limited mean over {steps}, size of one state over {size}; "
+            f"recent mean over {last} (.7, .3); mean with {label}"
+        )
         made += [
             Candidate(whole, 10, _mean(alone, closed, tied)),
-            Candidate(
-                f"no twin: closed form's limited mean over {steps}, size of one state over {size}; "
-                f"recent mean over {last} (.7, .3); mean with {label}",
-                6,
-                _mean(closed, tied),
-                uses_twin=False,
-            ),
+            Candidate(without, 6, _mean(closed, tied), uses_twin=False),
         ]
     for many, share in SCATTER:
-        both = [f"{source}size of one state over {many}" for source in ("", CLOSED)]
-        made.append(
-            Candidate(
-                f"{whole}; scatter over {many} ({share:g})",
-                12,
-                _with_scatter(_mean(alone, closed, tied), both, share),
-            )
-        )
+        added, sizes = f"; scatter over {many} ({share:g})", [f"size of one state over {many}"]
+        sizes.append(f"{CLOSED}{sizes[0]}")
+        mean = _with_scatter(_mean(alone, closed, tied), sizes, share)
+        made.append(Candidate(f"{whole}{added}", 12, mean))
+        mean = _with_scatter(_mean(closed, tied), sizes[1:], share)
+        made.append(Candidate(f"{without}{added}", 7, mean, uses_twin=False))
     # Those with every part.
     full = [one for one in made if one.name.startswith(whole)]
     for one in full:
