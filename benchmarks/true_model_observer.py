@@ -157,6 +157,8 @@ class Judge:
     def score(self, innovations: Array) -> Array:
         """Return (time,) scores of one run, as of the closed form alone."""
         logs = np.log(self.score_of_innovations.score(innovations, np.zeros(len(innovations))))
+        if not self.share:
+            return np.asarray(np.exp(logs))
         scatter = self.scatter.scale.of(self.scatter.statistic(innovations))
         mixed = (1 - self.share) * logs + self.share * np.minimum(scatter, SATURATED)
         return np.asarray(np.exp(mixed))

@@ -159,8 +159,8 @@ def blame_windows(
     """Return (window, state) how much each state explains of what is seen at these windows.
 
     States are those of ``blamed_names``, ``windows`` ascend; see ``Signatures.blame``. Of the
-    twin's innovations alone: the other parts of the score, innovations of the closed form and
-    parity residuals, are of the same states.
+    twin's innovations alone, in which a shift, a drift and noise of every state are sought: what
+    the other parts of the score look at is of the same states.
     """
     assert scorer.innovation_scores is not None  # noqa: S101 (who asks has checked)
     signatures = Signatures.of(scorer.twin, scorer.innovation_scores.parts.twin)

@@ -21,11 +21,10 @@ from odisar.capability.outliers import NoiseSteps, SensorNoise
 ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
 #: What these are made of: innovations of the closed form (and their scatter), parity residuals.
 CLOSED_FORM, CONSISTENCY = "closed-form", "consistency"
-_OF_CLOSED_FORM = (WITHOUT_TRANSFORMER, CLOSED_FORM)
 
 #: Scatter counts no more than this, what is rare, on the common log scale.
 SATURATED = 1.0
-#: A sensor may read anything; a score must stay a number in single precision, and in JSON.
+#: However far out a statistic is, its score stays finite in single precision, and so in JSON.
 _LARGEST = 1.0e30
 
 
@@ -143,9 +142,13 @@ class MeanParts:
         }
         if self.scatter is not None:
             of_twin, of_closed = map(np.exp, self.scatter.of(run))
-            both = _geometric_mean((of_twin, 1.0), (of_closed, 1.0))
+            scattered = {
+                ODISAR: _geometric_mean((of_twin, 1.0), (of_closed, 1.0)),
+                WITHOUT_TRANSFORMER: of_closed,
+                CLOSED_FORM: of_closed,
+            }
             share = self.scatter.share
-            for name, scatter in ((ODISAR, both), *((n, of_closed) for n in _OF_CLOSED_FORM)):
+            for name, scatter in scattered.items():
                 made[name] = _geometric_mean((made[name], 1 - share), (scatter, share))
         return made | {CONSISTENCY: tied}
 

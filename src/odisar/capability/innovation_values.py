@@ -168,7 +168,7 @@ class NoiseValues(Section):
 
 
 class InnovationScoreValues(Section):
-    """The scores that the monitor's is made of, and the relations that one of them judges."""
+    """All that the monitor's score is made of: its parts, their relations, noise and scales."""
 
     twin: InnovationValues
     closed_form: InnovationValues

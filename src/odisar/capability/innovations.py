@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 _SHRINKAGE = 1.0e-6
 #: What is usual and what is rare on held-out recordings: 0 and 1 on the common scale.
 _USUAL, _RARE = 0.5, 0.99
+#: What is usual and rare isn't known from fewer values.
+_FEWEST = 20
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
 #: Below it a statistic is called zero; its log must stay finite.
@@ -89,9 +91,10 @@ class LogScale:
     def fit(cls, statistic: FloatArray) -> Self:
         """Fit on (time,) values of held-out recordings; NaN don't count."""
         known = statistic[np.isfinite(statistic)]
-        if not len(known):
+        if len(known) < _FEWEST:
             raise OdisarError(
-                "no held-out recording is long enough for the windows of the score; shorten them "
+                f"{len(known)} samples of validation recordings lie behind the windows of the "
+                f"score, and at least {_FEWEST} must, or nobody knows what is usual; shorten them "
                 "(the steps in cases.*.score of params.yaml), or add longer validation recordings"
             )
         logs = np.log(np.maximum(known, _SMALLEST))
@@ -218,8 +221,8 @@ class InnovationScore:
     most and, where there is one, the reconstruction error of the forecast (``reconstruction`` is
     its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
     mean of very few innovations, which lets go as soon as a disturbance has ended. 1 is what is
-    usual on held-out recordings, e = 2.7 what is rare. The monitor's is made of three of these (see
-    ``combined.InnovationScores``).
+    usual on held-out recordings, e = 2.7 what is rare. The monitor's mean has three of these (see
+    ``combined.MeanParts``).
     """
 
     mean: MeanInnovation

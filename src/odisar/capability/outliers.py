@@ -18,13 +18,14 @@ from odisar.capability.innovations import FloatArray, LogScale, moving_mean
 from odisar.capability.responses import StepResponse, state_directions
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
+from odisar.windows.coordinates import POSE_RATES
 
-#: A direction that is not seen at all explains nothing; keeps 0 / 0 out.
-_SMALLEST = 1.0e-12
+#: A direction that is not seen at all explains nothing; keeps 0 / 0 out in any unit.
+_SMALLEST = np.finfo(np.float64).tiny
 #: Samples whose responses are in memory at a time.
-_CHUNK = 4096
+_CHUNK = 512
 #: Of the states that can be blamed the first three are a pose, where there is one.
-_POSE = slice(3)
+_POSE = slice(POSE_RATES)
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,12 @@ class OutlierFilter:
         for start in range(1, len(positions), _CHUNK):
             now = np.arange(start, min(start + _CHUNK, len(positions)))
             first = state_directions(self.twin, recording, positions[now - 1])
-            second = -np.einsum("tsf,tgf->tsg", first, self.response.carried(samples[now - 1]))
+            second = -first @ self.response.carried(samples[now - 1]).transpose(0, 2, 1)
             if self.twin.spec.pose is not None:
                 # A wrong position is two wrong rates, to it and back from it.
                 second[:, _POSE] -= first[:, _POSE]
             output, size = (
-                np.einsum("tsf,tsf->ts", first @ precision, before)
-                + np.einsum("tsf,tsf->ts", second @ precision, after)
+                (first @ precision * before + second @ precision * after).sum(axis=-1)
                 for before, after in (
                     (innovations[now - 1, None], innovations[now, None]),
                     (first, second),

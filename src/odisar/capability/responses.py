@@ -101,6 +101,8 @@ class StepResponse:
     def _slope(self, samples: NDArray[np.floating]) -> FloatArray:
         """Return (time, state feature, state feature) the derivative of products and squares."""
         known = np.nan_to_num(samples.astype(np.float64))
-        slope = np.einsum("sfg,tg->tsf", self.products, known)
-        slope += 2.0 * self.squares * np.abs(known)[:, None, :]
-        return np.asarray(slope[:, :, list(self.states)])
+        states = list(self.states)
+        products = self.products[:, states].reshape(-1, known.shape[1])
+        slope = (known @ products.T).reshape(len(known), -1, len(states))
+        slope += 2.0 * self.squares[:, states] * np.abs(known[:, None, states])
+        return slope

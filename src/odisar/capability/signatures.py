@@ -53,7 +53,8 @@ class Signatures:
         ratio of the state's best fault, a shift, a drift or noise, at the best of its possible
         onsets.
         """
-        # What is rare now may have set in when the oldest sample that is looked at came.
+        # What is rare now may have set in when the oldest sample of these statistics came. Scatter
+        # may have been adding up for longer; of what is so weak more samples tell no more.
         memory = max(self.score.mean.steps, self.score.size.steps)
         lead_in = memory + len(self.response.linear) - 1
         starts = alarm_starts(self.score.parts(innovations).max(axis=0) >= 1, memory)

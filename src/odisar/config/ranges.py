@@ -7,7 +7,6 @@ from pydantic import Field, model_validator
 from odisar.config.base import Section
 
 NonNegativeInt = Annotated[int, Field(ge=0)]
-NonNegativeFloat = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 

@@ -4,8 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import Fraction, PositiveFloat, PositiveInt, Section
-from odisar.config.ranges import NonNegativeFloat, NonNegativeInt, Range, Share
+from odisar.config.base import Fraction, NonNegativeFloat, PositiveFloat, PositiveInt, Section
+from odisar.config.ranges import NonNegativeInt, Range, Share
 
 
 class FurnitureConfig(Section):

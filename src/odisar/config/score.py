@@ -1,8 +1,8 @@
 """The windows of the monitor's score: how far back each of its statistics looks."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from odisar.config.base import NonNegativeFloat, PositiveInt, Section
 
@@ -46,9 +46,22 @@ class NoiseConfig(Section):
     recent_share: _Weight
     margin: NonNegativeFloat
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.recent_steps > self.lasting_steps:
+            raise ValueError(
+                f"recent_steps={self.recent_steps} must not be above "
+                f"lasting_steps={self.lasting_steps}"
+            )
+        return self
+
 
 class ScoreConfig(Section):
-    """Of a case's innovations, the twin's and its closed form's alike, and parity residuals."""
+    """How far back a case's score looks.
+
+    On innovations, the twin's and its closed form's alike, on parity residuals (``consistency``),
+    on the scatter that adds up and on the noise of one sensor.
+    """
 
     innovation: StatisticsConfig
     consistency: StatisticsConfig

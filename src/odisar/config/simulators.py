@@ -6,8 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import Fraction, PositiveFloat, PositiveInt, Section
-from odisar.config.ranges import NonNegativeFloat, NonNegativeInt, Share
+from odisar.config.base import Fraction, NonNegativeFloat, PositiveFloat, PositiveInt, Section
+from odisar.config.ranges import NonNegativeInt, Share
 from odisar.config.ranges import Range as Range  # noqa: PLC0414 (the ferry imports it here)
 from odisar.config.robot import RobotSimulatorConfig
 

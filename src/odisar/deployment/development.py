@@ -26,7 +26,7 @@ class DevelopmentScore:
     ``auroc`` is None where the development recordings hold no disturbed or no undisturbed sample,
     the interval (over recordings that vary together) also where there is only one cluster.
     ``measured_on`` is a hash of the recordings and of the positions that were scored (they depend
-    on context and horizon): two scores can be compared where it is the same.
+    on context, horizon and the windows of the score): two can be compared where it is the same.
     """
 
     auroc: float | None

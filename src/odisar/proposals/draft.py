@@ -209,9 +209,10 @@ def _judging(draft: Draft) -> Iterator[str]:
     tens = {"mean_steps": 10, "size_steps": 10}
     yield line(12, f"innovation: {flow(**tens, recent_steps=3, recent_share=0.3)}")
     yield line(12, f"consistency: {flow(**tens, recent_steps=1, recent_share=0.4)}")
-    yield line(12, f"scatter: {flow(steps=20, share=0.0)}", note="a share for what lasts minutes")
+    scatter = flow(steps=20, share=0.0)
+    yield line(12, f"scatter: {scatter}", note="share: raise where disturbances last for minutes")
     noise = flow(lasting_steps=10, recent_steps=3, recent_share=0.5, margin=0.3)
-    yield line(12, f"noise: {noise}")
+    yield line(12, f"noise: {noise}", note="margin: 0 hears one noisy sensor soonest")
     yield line(
         8,
         f"persistence_s: {scalar(draft.persistence_s)}",

@@ -144,10 +144,11 @@ def _reading(results: Results) -> list[str]:
             "P1 is the paper's protocol: a window's score stands for every step of its horizon."
         ),
         (
-            "ODiSAR is the mean of three scores, of the twin's innovations, of its closed form's, "
-            "and of the consistency of one sample, or the noise of one sensor, whichever is rarer. "
-            "Closed form and consistency stand beside it alone; all but the Transformer together "
-            "are ODiSAR without Transformer."
+            "ODiSAR is a mean: of the twin's innovations, of its closed form's, of the consistency "
+            "of one sample and, where a case gives it a share, of scatter that adds up over many "
+            "samples. Where the noise of one sensor is rarer than this mean, it counts instead. "
+            "The closed form (with its scatter) and consistency stand beside it alone; all but "
+            "the Transformer together are ODiSAR without Transformer."
         ),
     ]
     for setup in results.setups:

@@ -118,7 +118,7 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
         made.append(Candidate(f"{whole}{added}", 12, mean))
         mean = _with_scatter(_mean(closed, tied), sizes[1:], share)
         made.append(Candidate(f"{without}{added}", 7, mean, uses_twin=False))
-    # Those with every part, of which consistency has its last size.
+    # Those with every part, consistency with the last of its sizes.
     full = [one for one in made if one.name.startswith(whole)]
     for one in full:
         for margin in MARGINS:

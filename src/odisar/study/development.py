@@ -3,7 +3,7 @@
 The rule: of the candidates that can be chosen, a case's is the one with the highest mean over cells
 (kind and strength) of (AUROC + TNR@TPR95) / 2 by protocol P2. No test recording has a part in it.
 Those can be that use the twin and have the noise of one sensor beside: the ferry's development
-recordings hold weather alone, and by them a detector would better not listen to its sensors.
+recordings hold weather alone, and by them a detector had better not listen to its sensors.
 """
 
 from collections.abc import Callable, Sequence

@@ -242,7 +242,7 @@ def _standing(version: ModelVersion, score: DevelopmentScore, rescore: Rescore) 
     except OdisarError as error:
         return Standing(number, None, str(error))
     if measured.measured_on != score.measured_on:
-        return Standing(number, None, "it scores other windows (context or horizon differ)")
+        return Standing(number, None, "it scores other samples (context, horizon or score differ)")
     return Standing(number, measured.auroc, "it cannot be measured on today's recordings")
 
 

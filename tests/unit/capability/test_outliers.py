@@ -24,9 +24,9 @@ ROOT = np.array([[1.0, 0.0], [0.6, 0.4]])
 PRECISION = np.linalg.inv(ROOT @ ROOT.T)
 
 
-def known_filter() -> OutlierFilter:
+def known_filter(unit: float = 1.0) -> OutlierFilter:
     """Return the filter of a command and two states that move as CARRIED says."""
-    scaler = SimpleNamespace(mean=np.zeros(3), std=np.array([2.0, 0.5, 4.0]))
+    scaler = SimpleNamespace(mean=np.zeros(3), std=np.array([2.0, 0.5, 4.0 * unit]))
     twin = SimpleNamespace(scaler=scaler, spec=SPEC, channel_names=CHANNELS)
     linear = np.stack([np.eye(2), np.eye(2) - CARRIED])
     return OutlierFilter(twin, StepResponse(linear, np.zeros((2, 3, 3)), np.zeros((2, 3)), (1, 2)))
@@ -39,10 +39,15 @@ def usual(samples: int = SAMPLES) -> np.ndarray:
     return innovations
 
 
-def squares(innovations: np.ndarray) -> np.ndarray:
+def squares(innovations: np.ndarray, unit: float = 1.0) -> np.ndarray:
     samples = np.zeros((len(innovations), 3))
     positions = np.arange(len(innovations)) % SAMPLES
-    return known_filter().squares(RECORDING, positions, innovations, samples, PRECISION)
+    return known_filter(unit).squares(RECORDING, positions, innovations, samples, PRECISION)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+def test_the_unit_of_a_channel_does_not_matter(unit):
+    np.testing.assert_allclose(squares(usual(), unit), squares(usual()), rtol=1e-9)
 
 
 @pytest.mark.parametrize("state", [0, 1])

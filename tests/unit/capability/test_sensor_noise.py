@@ -98,5 +98,17 @@ def test_no_window_crosses_from_one_run_into_the_next():
 
 
 def test_recordings_that_are_too_short_for_it_are_refused():
-    with pytest.raises(OdisarError, match="no held-out recording is long enough"):
+    with pytest.raises(OdisarError, match="0 samples of validation recordings lie behind"):
         SensorNoise.fit([squares("a", 9)] * 3, STEPS)
+
+
+@pytest.mark.parametrize(("known", "refused"), [(19, True), (20, False)])
+def test_what_is_usual_is_not_learnt_from_a_handful_of_samples(known, refused):
+    statistic = np.r_[np.full(30, np.nan), np.linspace(1.0, 2.0, known)]
+    if refused:
+        with pytest.raises(
+            OdisarError, match=r"19 samples .* at least 20 must.* longer validation"
+        ):
+            LogScale.fit(statistic)
+    else:
+        assert LogScale.fit(statistic).usual == pytest.approx(np.log(1.5))

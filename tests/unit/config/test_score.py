@@ -49,6 +49,14 @@ def test_no_margin_and_no_scatter_are_declared_by_zero(score, part, key):
     assert getattr(getattr(ScoreConfig.model_validate(score), part), key) == 0
 
 
+def test_recent_noise_is_no_older_than_lasting_noise(score):
+    score["noise"] |= {"lasting_steps": 4, "recent_steps": 5}
+    with pytest.raises(ValidationError, match=r"recent_steps=5 must not be above lasting_steps=4"):
+        ScoreConfig.model_validate(score)
+    score["noise"]["recent_steps"] = 4
+    assert ScoreConfig.model_validate(score).noise.recent_steps == 4
+
+
 def test_every_shipped_case_listens_to_its_sensors(request):
     cases = load_config(request.config.rootpath).cases
     assert len(cases) == 4

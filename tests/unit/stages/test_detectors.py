@@ -62,7 +62,7 @@ def other_windows() -> ScoreConfig:
                 "recent_share": 0.4,
             },
             "scatter": {"steps": 6, "share": 0.1},
-            "noise": {"lasting_steps": 8, "recent_steps": 9, "recent_share": 0.6, "margin": 0.7},
+            "noise": {"lasting_steps": 9, "recent_steps": 8, "recent_share": 0.6, "margin": 0.7},
         }
     )
 
@@ -171,7 +171,7 @@ def test_the_steps_of_a_score_are_those_that_its_case_asks_for():
         consistency=InnovationSteps(mean=4, size=5, recent=1, recent_share=0.4),
         scatter=6,
         scatter_share=0.1,
-        noise=NoiseSteps(lasting=8, recent=9, recent_share=0.6, margin=0.7),
+        noise=NoiseSteps(lasting=9, recent=8, recent_share=0.6, margin=0.7),
     )
 
 
@@ -184,7 +184,7 @@ def test_noise_is_fitted_on_validation_recordings_by_the_closed_forms_precision(
         for item in data.splits["validation"]
         for run in scorer.runs(item, scorer.score(item, short_lead_steps=3))
     ]
-    assert fitted.noise == SensorNoise.fit(squares, NoiseSteps(8, 9, 0.6, 0.7))
+    assert fitted.noise == SensorNoise.fit(squares, NoiseSteps(9, 8, 0.6, 0.7))
 
 
 def test_relations_are_fitted_on_training_recordings(data, trained_twin):

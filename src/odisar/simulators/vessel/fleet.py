@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 from odisar.config.simulators import Maneuver, ManeuversConfig, VesselSimulatorConfig
 from odisar.recordings.schema import UNDISTURBED
@@ -80,18 +81,16 @@ def _disturbed_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
 
 def _one_component_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
     for split, runs in config.fleet.one_component.items():
-        for maneuver, variant in variants(config.maneuvers):
-            for case in runs.cases:
-                seed_name = f"{split}-{maneuver}-{variant}-{case}"
-                for component in runs.components:
-                    for strength in runs.strengths:
-                        yield RunPlan(
-                            name=f"{seed_name}-{component}-s{strength:g}",
-                            seed_name=seed_name,
-                            split=split,
-                            maneuver=maneuver,
-                            variant=variant,
-                            disturbance=case,
-                            components=component,
-                            strength=strength,
-                        )
+        for (maneuver, variant), case in product(variants(config.maneuvers), runs.cases):
+            seed_name = f"{split}-{maneuver}-{variant}-{case}"
+            for component, strength in product(runs.components, runs.strengths):
+                yield RunPlan(
+                    name=f"{seed_name}-{component}-s{strength:g}",
+                    seed_name=seed_name,
+                    split=split,
+                    maneuver=maneuver,
+                    variant=variant,
+                    disturbance=case,
+                    components=component,
+                    strength=strength,
+                )
