@@ -59,7 +59,7 @@ def test_a_champion_that_scores_other_windows_is_not_compared(root, bundle):
     elsewhere = development_score(0.5, "c")
     done = registered(root, bundle, development_score(0.95, "b"), lambda _deployed: elsewhere)
     assert not done.is_champion
-    assert "it scores other windows (context or horizon differ)" in done.decision
+    assert "it scores other samples (context, horizon or score differ)" in done.decision
 
 
 def test_two_that_register_one_content_at_once_make_one_version(root, bundle, client, monkeypatch):
