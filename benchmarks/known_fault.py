@@ -40,7 +40,7 @@ from odisar.windows.scaling import channel_std
 
 Array = NDArray[np.float64]
 
-WORKSPACE, KINDS = Path("workspaces/real"), ("noise", "bias")
+WORKSPACE, KINDS = Path("workspaces/real"), ("noise", "bias", "creep")
 #: Windows of the means that the regression is given, in samples.
 WINDOWS = (3, 5, 10, 20)
 #: Calibration recordings are copied with so many draws of each fault.

@@ -11,17 +11,19 @@ as the twin's are, on the test recordings, by protocol P2. Run it from the proje
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from sklearn.metrics import f1_score
 
 from odisar.artifacts import Workspace
-from odisar.capability.combined import SATURATED
-from odisar.capability.innovations import InnovationScore, InnovationSize
+from odisar.capability.combined import SATURATED, ScoreSteps
+from odisar.capability.innovations import InnovationScore, InnovationSize, LogScale
+from odisar.capability.thresholds import sigma_threshold
 from odisar.config.loader import load_config
 from odisar.config.score import ScoreConfig
 from odisar.config.simulators import VesselSimulatorConfig
@@ -145,23 +147,28 @@ class Judge:
 
     score_of_innovations: InnovationScore
     scatter: InnovationSize
-    share: float
+    steps: ScoreSteps
+    scale: LogScale | None = None
 
     @classmethod
     def fit(cls, runs: Sequence[Array], config: ScoreConfig) -> "Judge":
         """Fit on innovations (time, state) of undisturbed recordings."""
         steps = score_steps(config)
         score = InnovationScore.fit(runs, None, steps.innovation)
-        return cls(score, InnovationSize.fit(runs, steps.scatter), steps.scatter_share)
+        made = cls(score, InnovationSize.fit(runs, steps.scatter), steps)
+        return replace(made, scale=LogScale.fit(np.concatenate([made.mean(run) for run in runs])))
+
+    def mean(self, innovations: Array) -> Array:
+        """Return (time,) the mean of statistics along one run, as of the closed form alone."""
+        logs = np.log(self.score_of_innovations.score(innovations, np.zeros(len(innovations))))
+        scatter = self.scatter.scale.of(self.scatter.statistic(innovations))
+        share = self.steps.scatter_share
+        return np.asarray(np.exp((1 - share) * logs + share * np.minimum(scatter, SATURATED)))
 
     def score(self, innovations: Array) -> Array:
-        """Return (time,) scores of one run, as of the closed form alone."""
-        logs = np.log(self.score_of_innovations.score(innovations, np.zeros(len(innovations))))
-        if not self.share:
-            return np.asarray(np.exp(logs))
-        scatter = self.scatter.scale.of(self.scatter.statistic(innovations))
-        mixed = (1 - self.share) * logs + self.share * np.minimum(scatter, SATURATED)
-        return np.asarray(np.exp(mixed))
+        """Return (time,) scores of one run: their mean, let go of what is over."""
+        assert self.scale is not None  # noqa: S101 (fitted)
+        return np.exp(self.steps.release.of(self.scale.of(self.mean(innovations))))
 
 
 def main() -> None:
@@ -173,20 +180,26 @@ def main() -> None:
     noise = fit_process_noise(observer, held_out)
     usual, _ = observer.innovations(held_out, noise)
     judge = Judge.fit(list(usual.transpose(1, 0, 2)[:, 1:]), config.cases["vessel"].score)
-    disturbed = [item for item in data.splits["test"] if item.info.is_disturbed]
-    found, _ = observer.innovations(Fleet.of(disturbed, names), noise)
-    cells: dict[tuple[str, float], list[tuple[Array, NDArray[np.bool_]]]] = {}
     # As in the pipeline's tables: from the first time at which every detector can speak.
-    first = data.spec.context_steps + data.spec.horizon_steps
-    for run, item in enumerate(disturbed):
-        scores = judge.score(found[:, run])[first:]
-        labels = label_active(item.time_s[first:], item.intervals)
+    known = slice(data.spec.context_steps + data.spec.horizon_steps, None)
+
+    def judged(recordings: Sequence[Recording]) -> list[Array]:
+        found, _ = observer.innovations(Fleet.of(recordings, names), noise)
+        return [judge.score(found[:, run])[known] for run in range(len(recordings))]
+
+    calibration = np.concatenate(judged(data.splits["calibration"]))
+    threshold = sigma_threshold(calibration, config.capability.threshold_sigmas)
+    disturbed = [item for item in data.splits["test"] if item.info.is_disturbed]
+    cells: dict[tuple[str, float], list[tuple[Array, NDArray[np.bool_]]]] = {}
+    for item, scores in zip(disturbed, judged(disturbed), strict=True):
+        labels = label_active(item.time_s[known], item.intervals)
         cells.setdefault((item.info.components, item.info.strength), []).append((scores, labels))
     rows = []
     for (components, strength), members in sorted(cells.items()):
         scores, labels = (np.concatenate(part) for part in zip(*members, strict=True))
-        rows.append((components, strength, auroc(scores, labels), tnr_at_tpr95(scores, labels)))
-    table = pd.DataFrame(rows, columns=["components", "strength", "AUROC", "TNR@TPR95"])
+        ranking = auroc(scores, labels), tnr_at_tpr95(scores, labels)
+        rows.append((components, strength, *ranking, f1_score(labels, scores > threshold)))
+    table = pd.DataFrame(rows, columns=["components", "strength", "AUROC", "TNR@TPR95", "F1"])
     print(table.round(4).to_string(index=False))
 
 

@@ -8,6 +8,7 @@ from odisar.capability.combined import InnovationScores, Run, ScoreSteps
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps, conditional_squares
 from odisar.capability.outliers import NoiseSteps
+from odisar.capability.release import Release
 from odisar.seeding import generator
 
 STATES = (0, 1)
@@ -17,6 +18,7 @@ STEPS = ScoreSteps(
     scatter=7,
     scatter_share=0.15,
     noise=NoiseSteps(lasting=5, recent=2, recent_share=0.4, margin=0.3),
+    release=Release(steps=8, share=0.5),
 )
 
 

@@ -8,6 +8,7 @@ from odisar.capability.combined import InnovationScores, Run, ScoreSteps
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps
+from odisar.capability.release import Release
 from odisar.capability.scoring import Scorer
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
@@ -19,6 +20,7 @@ STEPS = ScoreSteps(
     scatter=9,
     scatter_share=0.2,
     noise=NoiseSteps(lasting=6, recent=2, recent_share=0.5, margin=0.2),
+    release=Release(steps=8, share=0.5),
 )
 #: The first score is known so many steps after the first forecast.
 KNOWN_AFTER = 10

@@ -19,7 +19,13 @@ import pandas as pd
 import torch
 
 from odisar.capability.assessment import Capability, Thresholds, assessments_json
-from odisar.capability.combined import CLOSED_FORM, ODISAR, InnovationScores, MeanParts
+from odisar.capability.combined import (
+    CLOSED_FORM,
+    ODISAR,
+    WITHOUT_TRANSFORMER,
+    InnovationScores,
+    MeanParts,
+)
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
@@ -29,6 +35,7 @@ from odisar.capability.innovations import (
     MeanInnovation,
 )
 from odisar.capability.outliers import NoiseSteps, SensorNoise
+from odisar.capability.release import Release
 from odisar.capability.scoring import RECONSTRUCTION, Scorer
 from odisar.config.cases import Groups
 from odisar.config.judging import Judging, OperatingPoint
@@ -158,7 +165,12 @@ def analytic_scores() -> InnovationScores:
     )
     steps = NoiseSteps(lasting=3, recent=2, recent_share=0.5, margin=0.1)
     noise = SensorNoise(steps, LogScale(-0.5, 0.3), LogScale(-0.6, 0.4))
-    return InnovationScores(parts, noise, LogScale(-0.3, 1.2), LogScale(-0.4, 1.3))
+    scales = {
+        ODISAR: LogScale(-0.3, 1.2),
+        WITHOUT_TRANSFORMER: LogScale(-0.4, 1.3),
+        CLOSED_FORM: LogScale(-0.2, 1.1),
+    }
+    return InnovationScores(parts, noise, scales, Release(steps=6, share=0.5))
 
 
 def analytic_relations() -> Consistency:

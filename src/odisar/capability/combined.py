@@ -1,6 +1,6 @@
 """The monitor's score: what innovations, parity residuals and noise of one sensor say together."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,11 +16,14 @@ from odisar.capability.innovations import (
     LogScale,
 )
 from odisar.capability.outliers import NoiseSteps, SensorNoise
+from odisar.capability.release import Release
 
 #: The monitor's score, and the same without its Transformer.
 ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
 #: What these are made of: innovations of the closed form (and their scatter), parity residuals.
 CLOSED_FORM, CONSISTENCY = "closed-form", "consistency"
+#: Detectors whose means are put on the common log scale and let go of what is over.
+RELEASED = (ODISAR, WITHOUT_TRANSFORMER, CLOSED_FORM)
 
 #: Scatter counts no more than this, what is rare, on the common log scale.
 SATURATED = 1.0
@@ -53,6 +56,7 @@ class ScoreSteps:
     scatter: int
     scatter_share: float
     noise: NoiseSteps
+    release: Release
 
 
 @dataclass(frozen=True)
@@ -158,14 +162,14 @@ class InnovationScores:
     """The monitor's score: the mean of its parts, or the noise of one sensor, whichever is rarer.
 
     A mean would dilute one noisy sensor, which the other parts hardly see; so ``noise`` stands
-    beside it. ``scale`` and ``scale_without`` (the Transformer) put the mean on noise's log scale:
-    1 is what is usual on held-out recordings, e what is rare.
+    beside it. ``scales`` put means, by detector, on noise's log scale: 1 is what is usual on
+    held-out recordings, e what is rare. ``release`` lets them go when something strong is over.
     """
 
     parts: MeanParts
     noise: SensorNoise
-    scale: LogScale
-    scale_without: LogScale
+    scales: Mapping[str, LogScale]
+    release: Release
 
     @property
     def known_after_steps(self) -> int:
@@ -178,18 +182,19 @@ class InnovationScores:
         parts = MeanParts.fit(runs, relations, steps)
         outliers = [run.outliers(parts.closed_form.size.precision) for run in runs]
         means = [parts.of(run) for run in runs]
-        scale, without = (
-            LogScale.fit(np.concatenate([mean[name] for mean in means]))
-            for name in (ODISAR, WITHOUT_TRANSFORMER)
-        )
-        return cls(parts, SensorNoise.fit(outliers, steps.noise), scale, without)
+        scales = {
+            name: LogScale.fit(np.concatenate([mean[name] for mean in means])) for name in RELEASED
+        }
+        return cls(parts, SensorNoise.fit(outliers, steps.noise), scales, steps.release)
 
     def of(self, run: Run) -> dict[str, NDArray[np.float32]]:
         """Return (window,) scores along one gapless run by detector."""
         made = self.parts.of(run)
         noise = self.noise.score(run.outliers(self.parts.closed_form.size.precision))
-        for name, scale in ((ODISAR, self.scale), (WITHOUT_TRANSFORMER, self.scale_without)):
-            made[name] = np.exp(np.maximum(scale.of(made[name]), noise))
+        for name in RELEASED:
+            logs = self.scales[name].of(made[name])
+            heard = logs if name == CLOSED_FORM else np.maximum(logs, noise)
+            made[name] = np.exp(self.release.of(heard))
         return {name: np.minimum(part, _LARGEST).astype(np.float32) for name, part in made.items()}
 
 

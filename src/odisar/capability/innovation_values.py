@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from odisar.capability.combined import InnovationScores, MeanParts, Scatter
+from odisar.capability.combined import RELEASED, InnovationScores, MeanParts, Scatter
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     InnovationLimit,
@@ -15,6 +15,7 @@ from odisar.capability.innovations import (
     MeanInnovation,
 )
 from odisar.capability.outliers import NoiseSteps, SensorNoise
+from odisar.capability.release import Release
 from odisar.config.base import PositiveInt, Section
 
 _NUMBER_LIMIT = 1e30
@@ -167,6 +168,13 @@ class NoiseValues(Section):
         )
 
 
+class ReleaseValues(Section):
+    """How the score lets go of something strong that is over."""
+
+    steps: PositiveInt
+    share: Annotated[float, Field(ge=0, le=1)]
+
+
 class InnovationScoreValues(Section):
     """All that the monitor's score is made of: its parts, their relations, noise and scales."""
 
@@ -177,8 +185,14 @@ class InnovationScoreValues(Section):
     share_holding: Annotated[float, Field(ge=0, le=1)]
     scatter: ScatterValues | None
     noise: NoiseValues
-    scale: ScaleValues
-    scale_without: ScaleValues
+    scales: dict[str, ScaleValues]
+    release: ReleaseValues
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if set(self.scales) != set(RELEASED):
+            raise ValueError(f"scales: expected {', '.join(RELEASED)}")
+        return self
 
     @classmethod
     def of(cls, scores: InnovationScores) -> Self:
@@ -192,8 +206,8 @@ class InnovationScoreValues(Section):
             share_holding=parts.share_holding,
             scatter=None if parts.scatter is None else ScatterValues.of(parts.scatter),
             noise=NoiseValues.of(scores.noise),
-            scale=ScaleValues(**vars(scores.scale)),
-            scale_without=ScaleValues(**vars(scores.scale_without)),
+            scales={name: ScaleValues(**vars(s)) for name, s in scores.scales.items()},
+            release=ReleaseValues(**vars(scores.release)),
         )
 
     def build(self) -> InnovationScores:
@@ -210,8 +224,8 @@ class InnovationScoreValues(Section):
         return InnovationScores(
             parts,
             self.noise.build(),
-            LogScale(**self.scale.model_dump()),
-            LogScale(**self.scale_without.model_dump()),
+            {name: LogScale(**scale.model_dump()) for name, scale in self.scales.items()},
+            Release(**self.release.model_dump()),
         )
 
     @property

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from odisar.config.base import NonNegativeFloat, PositiveInt, Section
 
 _Weight = Annotated[float, Field(ge=0, lt=1)]
+_Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class StatisticsConfig(Section):
@@ -56,14 +57,26 @@ class NoiseConfig(Section):
         return self
 
 
+class ReleaseConfig(Section):
+    """How a score lets go of something strong that is over.
+
+    ``share`` of its fall below its highest value within the last ``steps`` samples is taken off as
+    well, where that was strong and it has fallen far. A share of 0 leaves scores as they are.
+    """
+
+    steps: PositiveInt
+    share: _Share
+
+
 class ScoreConfig(Section):
     """How far back a case's score looks.
 
     On innovations, the twin's and its closed form's alike, on parity residuals (``consistency``),
-    on the scatter that adds up and on the noise of one sensor.
+    on the scatter that adds up and on the noise of one sensor; and how it lets go (``release``).
     """
 
     innovation: StatisticsConfig
     consistency: StatisticsConfig
     scatter: ScatterConfig
     noise: NoiseConfig
+    release: ReleaseConfig

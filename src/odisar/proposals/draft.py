@@ -213,6 +213,8 @@ def _judging(draft: Draft) -> Iterator[str]:
     yield line(12, f"scatter: {scatter}", note="share: raise where disturbances last for minutes")
     noise = flow(lasting_steps=10, recent_steps=3, recent_share=0.5, margin=0.3)
     yield line(12, f"noise: {noise}", note="margin: 0 hears one noisy sensor soonest")
+    release = flow(steps=10, share=0.5)
+    yield line(12, f"release: {release}", note="lets go of something strong that is over")
     yield line(
         8,
         f"persistence_s: {scalar(draft.persistence_s)}",

@@ -13,6 +13,7 @@ from odisar.capability.combined import InnovationScores, ScoreSteps
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps
+from odisar.capability.release import Release
 from odisar.capability.scoring import RecordingScores, Scorer
 from odisar.config.score import ScoreConfig, StatisticsConfig
 from odisar.recordings.schema import Recording
@@ -101,6 +102,7 @@ def score_steps(config: ScoreConfig) -> ScoreSteps:
         scatter=config.scatter.steps,
         scatter_share=config.scatter.share,
         noise=NoiseSteps(noise.lasting_steps, noise.recent_steps, noise.recent_share, noise.margin),
+        release=Release(config.release.steps, config.release.share),
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from odisar.capability.combined import SATURATED
 from odisar.capability.innovations import FloatArray
+from odisar.capability.release import Release
 from odisar.capability.scoring import RECONSTRUCTION
 
 #: Steps of the windows that are tried, and leads of forecasts that are compared with now.
@@ -18,6 +19,8 @@ RECENT, _TIED_SIZES = (1, 3, 5), (3, 10)
 SCATTER = ((20, 0.2), (60, 0.3), (60, 0.45))
 #: How much further out than the rest the noise of one sensor must be, on the common log scale.
 MARGINS = (0.0, 0.3, 0.75)
+#: Letting go, beside not doing so.
+RELEASES = (Release(10, 0.5), Release(60, 0.5), Release(60, 1.0))
 
 #: Before the name of a statistic of the closed form's innovations, of parity residuals.
 CLOSED, PARITY = "closed form's ", "parity residuals' "
@@ -33,7 +36,8 @@ class Candidate:
     """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those.
 
     One that doesn't use the twin is there to be compared with, not to be chosen. With a
-    ``noise_margin`` it is that or the noise of one sensor less the margin, whichever is rarer.
+    ``noise_margin`` it is that or the noise of one sensor less the margin, whichever is rarer, and
+    with a ``release`` it lets go of what is over.
     """
 
     name: str
@@ -41,6 +45,7 @@ class Candidate:
     of: Callable[[Statistics], FloatArray]
     uses_twin: bool = True
     noise_margin: float | None = None
+    release: Release | None = None
 
     @property
     def can_be_chosen(self) -> bool:
@@ -89,8 +94,8 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     """Return the largest of three, of a mean that single innovations can't rule.
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
-    say as well; the last also with the scatter that adds up, and with the noise of one sensor
-    beside. In between the same without the twin.
+    say as well; the last also with the scatter that adds up, with the noise of one sensor beside,
+    and letting go. In between the same without the twin.
     """
     name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
     name += f"; recent mean over {last} (.7, .3)"
@@ -122,8 +127,12 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     full = [one for one in made if one.name.startswith(whole)]
     for one in full:
         for margin in MARGINS:
-            beside = f"{one.name}; or {NOISE}, {margin:g}"
-            made.append(replace(one, name=beside, parts=one.parts + 2, noise_margin=margin))
+            name = f"{one.name}; or {NOISE}, {margin:g}"
+            heard = replace(one, name=name, parts=one.parts + 2, noise_margin=margin)
+            made.append(heard)
+            for release in RELEASES:
+                name = f"{heard.name}; release over {release.steps} ({release.share:g})"
+                made.append(replace(heard, name=name, release=release))
     return made
 
 

@@ -7,7 +7,7 @@ recordings hold weather alone, and by them a detector had better not listen to i
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -94,7 +94,7 @@ def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, 
     lead = data.case.short_lead_steps
     held_out = [(i, scorer.score(i, short_lead_steps=lead)) for i in data.splits["validation"]]
     makers = fit_statistics(data, scorer, held_out)
-    cells: dict[tuple[str, float], list[tuple[Statistics, NDArray[np.bool_]]]] = {}
+    cells: dict[tuple[str, float], list[_Seen]] = {}
     for item in data.splits["development"]:
         if item.info.is_disturbed:
             scores = scorer.score(item, short_lead_steps=lead)
@@ -103,7 +103,8 @@ def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, 
             # On a ship the parts of the weather that are disturbed, on a robot the kind of fault.
             info = item.info
             kind = info.components if data.case.pose is None else info.disturbance
-            cells.setdefault((kind, info.strength or 0.0), []).append((made, labels))
+            seen = _Seen(made, labels, scores.runs)
+            cells.setdefault((kind, info.strength or 0.0), []).append(seen)
     usual = [{name: make(item, s) for name, make in makers.items()} for item, s in held_out]
     offered = [(one, _scale(one, usual)) for one in candidates()]
     return [
@@ -122,27 +123,41 @@ def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, 
     ]
 
 
-def _scale(one: Candidate, usual: Sequence[Statistics]) -> LogScale:
-    """Return what puts a candidate on the scale of noise: held-out recordings are as rare there."""
+@dataclass(frozen=True)
+class _Seen:
+    """A development recording: statistics and labels (time,), and its gapless runs."""
+
+    statistics: Statistics
+    labels: NDArray[np.bool_]
+    runs: tuple[tuple[int, int], ...]
+
+
+def _scale(one: Candidate, usual: Sequence[Statistics]) -> LogScale | None:
+    """Return what puts a candidate on the scale of noise: held-out recordings are as rare there.
+
+    One without noise beside needs none.
+    """
+    if one.noise_margin is None:
+        return None
     return LogScale.fit(np.exp(np.concatenate([one.of(made) for made in usual])))
 
 
-def _said(one: Candidate, scale: LogScale, made: Statistics) -> FloatArray:
-    mean = one.of(made)
-    if one.noise_margin is None:
+def _said(one: Candidate, scale: LogScale | None, seen: _Seen) -> FloatArray:
+    mean = one.of(seen.statistics)
+    if scale is None or one.noise_margin is None:
         return mean
-    return np.maximum(scale.of(np.exp(mean)), made[NOISE] - one.noise_margin)
+    heard = np.maximum(scale.of(np.exp(mean)), seen.statistics[NOISE] - one.noise_margin)
+    if one.release is None:
+        return heard
+    return np.concatenate([one.release.of(heard[start:stop]) for start, stop in seen.runs])
 
 
 def _judged(
-    one: Candidate,
-    scale: LogScale,
-    members: list[tuple[Statistics, NDArray[np.bool_]]],
-    horizon_steps: int,
+    one: Candidate, scale: LogScale | None, members: list[_Seen], horizon_steps: int
 ) -> dict[str, float]:
     # As in the pipeline's tables, time before a forecast error could be known is left out.
-    scores = np.concatenate([_said(one, scale, made)[horizon_steps:] for made, _ in members])
-    labels = np.concatenate([labels[horizon_steps:] for _, labels in members])
+    scores = np.concatenate([_said(one, scale, seen)[horizon_steps:] for seen in members])
+    labels = np.concatenate([seen.labels[horizon_steps:] for seen in members])
     known = np.isfinite(scores)
     return {
         "auroc": auroc(scores[known], labels[known]),

@@ -11,6 +11,7 @@ from odisar.capability.combined import (
     CLOSED_FORM,
     CONSISTENCY,
     ODISAR,
+    RELEASED,
     WITHOUT_TRANSFORMER,
     InnovationScores,
     MeanParts,
@@ -25,8 +26,8 @@ from small_innovations import STEPS as SMALL_STEPS
 from small_innovations import runs_of
 from small_system import make_gusty
 
-#: Which scale the mean of a detector is put on.
-SCALES = {ODISAR: "scale", WITHOUT_TRANSFORMER: "scale_without"}
+#: Detectors that listen to noise.
+HEARING = (ODISAR, WITHOUT_TRANSFORMER)
 
 
 @pytest.fixture(scope="module")
@@ -61,23 +62,38 @@ def test_the_mean_is_the_weighed_geometric_one_of_three_parts(scores, share):
     assert parts.known_after_steps == (8 if share else 6)
 
 
-@pytest.mark.parametrize("name", [ODISAR, WITHOUT_TRANSFORMER])
+@pytest.mark.parametrize("name", HEARING)
 def test_the_whole_is_the_larger_of_the_mean_and_noise_on_one_log_scale(scores, name):
     run = invented_run("fresh", 400)
-    mean = getattr(scores, SCALES[name]).of(scores.parts.of(run)[name])
+    mean = scores.scales[name].of(scores.parts.of(run)[name])
     noise = noise_of(scores, run)
     found = scores.of(run)[name]
-    np.testing.assert_allclose(found, np.exp(np.maximum(mean, noise)), rtol=1e-5)
+    wanted = np.exp(scores.release.of(np.maximum(mean, noise)))
+    np.testing.assert_allclose(found, wanted, rtol=1e-5)
     # Each of them counts at times.
     assert {True, False} == set((noise > mean)[scores.known_after_steps :])
     assert found.dtype == np.float32
+
+
+@pytest.mark.parametrize("name", RELEASED)
+def test_every_mean_on_the_log_scale_lets_go_of_something_strong_that_is_over(scores, name):
+    run = with_outliers(invented_run("fresh", 300), 0.0)
+    innovations, closed_form = run.innovations.copy(), run.closed_form.copy()
+    for struck in (innovations, closed_form):
+        struck[200:220] *= 200
+    run = replace(run, innovations=innovations, closed_form=closed_form)
+    mean = scores.scales[name].of(scores.parts.of(run)[name])
+    found = np.log(scores.of(run)[name])
+    np.testing.assert_allclose(found, scores.release.of(mean), atol=1e-5)
+    assert (found[200:220] > 2).all()
+    assert (found[220:230] < mean[220:230] - 0.5).any()
 
 
 def test_noise_raises_the_whole_and_neither_the_closed_form_nor_consistency(scores):
     calm = scores.of(with_outliers(invented_run("fresh"), 0.0))
     loud = scores.of(with_outliers(invented_run("fresh"), 1e4))
     known = slice(scores.known_after_steps, None)
-    for name in SCALES:
+    for name in HEARING:
         assert (loud[name][known] > 2 * calm[name][known]).all()
     for name in (CLOSED_FORM, CONSISTENCY):
         np.testing.assert_array_equal(loud[name], calm[name])
@@ -87,7 +103,7 @@ def test_whatever_a_sensor_reads_the_whole_stays_a_number(scores):
     run = invented_run("fresh")
     extreme = replace(run, innovations=1e150 * run.innovations, closed_form=1e150 * run.closed_form)
     known = slice(scores.known_after_steps, None)
-    for name in SCALES:
+    for name in HEARING:
         assert np.isfinite(scores.of(extreme)[name][known]).all()
         assert scores.of(extreme)[name][known].min() > scores.of(run)[name][known].max()
 
@@ -109,13 +125,15 @@ def test_the_filter_is_asked_with_the_precision_of_the_closed_forms_innovations(
 
 def test_on_what_it_was_fitted_to_the_mean_is_usually_zero_and_rarely_one(scores):
     held_out = [invented_run("values"), invented_run("more", 150)]
-    for name, scale in SCALES.items():
+    assert set(scores.scales) == {*HEARING, CLOSED_FORM}
+    for name, scale in scores.scales.items():
         means = np.concatenate([scores.parts.of(run)[name] for run in held_out])
-        assert getattr(scores, scale) == LogScale.fit(means)
-        found = getattr(scores, scale).of(means[np.isfinite(means)])
+        assert scale == LogScale.fit(means)
+        found = scale.of(means[np.isfinite(means)])
         np.testing.assert_allclose(np.quantile(found, [0.5, 0.99]), [0, 1], atol=0.02)
     noise = [run.outliers(scores.parts.closed_form.size.precision) for run in held_out]
     assert scores.noise == SensorNoise.fit(noise, STEPS.noise)
+    assert scores.release == STEPS.release
 
 
 def test_the_share_is_that_of_relations_which_hold_on_held_out_recordings(scores):
@@ -164,7 +182,7 @@ def test_the_monitor_hears_a_noisy_sensor_that_the_mean_of_its_parts_misses(
 ):
     usual = [make_gusty(f"usual-{i}") for i in range(6)]
     faulty = runs_of(gusty_twin, noisy(channel))
-    missed = [monitor.scale.of(monitor.parts.of(run)[ODISAR]) for run in faulty]
+    missed = [monitor.scales[ODISAR].of(monitor.parts.of(run)[ODISAR]) for run in faulty]
     heard = [np.log(monitor.of(run)[ODISAR]) for run in faulty]
     false = [np.log(monitor.of(run)[ODISAR]) for run in runs_of(gusty_twin, usual)]
     assert share_of_rare(missed) < 0.1

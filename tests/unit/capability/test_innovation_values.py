@@ -9,6 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from invented_scores import STEPS, invented_run, invented_scores
+from odisar.capability.combined import RELEASED
 from odisar.capability.innovation_values import InnovationScoreValues
 
 
@@ -31,8 +32,8 @@ def test_noise_scatter_and_the_scales_come_back_as_they_were(content):
     scores, back = invented_scores(), InnovationScoreValues.model_validate(content).build()
     assert back.noise == scores.noise
     assert back.noise.steps == STEPS.noise
-    assert (back.scale, back.scale_without) == (scores.scale, scores.scale_without)
-    assert back.scale != back.scale_without
+    assert (back.scales, back.release) == (scores.scales, scores.release)
+    assert len({(scale.usual, scale.rare) for scale in back.scales.values()}) == len(RELEASED)
     assert back.parts.scatter.share == 0.15
     for part in ("twin", "closed_form"):
         wanted, found = getattr(scores.parts.scatter, part), getattr(back.parts.scatter, part)
@@ -153,8 +154,12 @@ def test_relations_that_can_be_none_are_refused(content, key, value, complaint):
         (("scatter", "twin", "precision"), [[1.0, 0.0]], "expected 1 numbers in each row"),
         (("scatter", "closed_form", "scale"), {"usual": 2.0, "rare": 1.0}, "above usual=2.0"),
         (("scatter", "closed_form"), None, "scatter.closed_form"),
-        (("scale",), {"usual": 1.0, "rare": 0.0}, "must be above usual=1.0"),
-        (("scale_without",), {"usual": 0.0}, "scale_without.rare"),
+        (("scales", "odisar"), {"usual": 1.0, "rare": 0.0}, "must be above usual=1.0"),
+        (("scales", "closed-form"), {"usual": 0.0}, "scales.closed-form.rare"),
+        (("scales", "other"), {"usual": 0.0, "rare": 1.0}, "expected odisar, without-transformer"),
+        (("release", "steps"), 0, "greater than 0"),
+        (("release", "share"), 1.1, "less than or equal to 1"),
+        (("release", "share"), -0.1, "greater than or equal to 0"),
     ],
 )
 def test_noise_scatter_and_scales_that_can_be_none_are_refused(content, place, value, complaint):
@@ -166,7 +171,7 @@ def test_noise_scatter_and_scales_that_can_be_none_are_refused(content, place, v
         InnovationScoreValues.model_validate(content)
 
 
-@pytest.mark.parametrize("key", ["noise", "scale", "scale_without", "share_holding", "relations"])
+@pytest.mark.parametrize("key", ["noise", "scales", "release", "share_holding", "relations"])
 def test_whatever_of_the_whole_is_missing_is_named(content, key):
     del content[key]
     with pytest.raises(ValidationError, match=key):

@@ -25,6 +25,9 @@ def score():
         ("scatter", "steps", 0),
         ("scatter", "share", -0.1),
         ("scatter", "share", 1.0),
+        ("release", "steps", 0),
+        ("release", "share", 1.1),
+        ("release", "share", -0.1),
         ("innovation", "recent_share", 1.0),
         ("consistency", "recent_share", 1.0),
         ("consistency", "share", 0.1),
@@ -43,8 +46,10 @@ def test_no_window_or_weight_has_a_default(score, part, key):
         ScoreConfig.model_validate(score)
 
 
-@pytest.mark.parametrize(("part", "key"), [("noise", "margin"), ("scatter", "share")])
-def test_no_margin_and_no_scatter_are_declared_by_zero(score, part, key):
+@pytest.mark.parametrize(
+    ("part", "key"), [("noise", "margin"), ("scatter", "share"), ("release", "share")]
+)
+def test_no_margin_no_scatter_and_no_release_are_declared_by_zero(score, part, key):
     score[part][key] = 0.0
     assert getattr(getattr(ScoreConfig.model_validate(score), part), key) == 0
 

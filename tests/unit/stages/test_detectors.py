@@ -10,6 +10,7 @@ from odisar.baselines.range_rule import range_rule_scores
 from odisar.capability.combined import ScoreSteps
 from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps, SensorNoise
+from odisar.capability.release import Release
 from odisar.capability.scoring import DETECTORS, RecordingScores, Scorer
 from odisar.config.cases import RangeRule
 from odisar.config.loader import load_config
@@ -63,6 +64,7 @@ def other_windows() -> ScoreConfig:
             },
             "scatter": {"steps": 6, "share": 0.1},
             "noise": {"lasting_steps": 9, "recent_steps": 8, "recent_share": 0.6, "margin": 0.7},
+            "release": {"steps": 12, "share": 0.8},
         }
     )
 
@@ -172,6 +174,7 @@ def test_the_steps_of_a_score_are_those_that_its_case_asks_for():
         scatter=6,
         scatter_share=0.1,
         noise=NoiseSteps(lasting=9, recent=8, recent_share=0.6, margin=0.7),
+        release=Release(steps=12, share=0.8),
     )
 
 
@@ -185,6 +188,7 @@ def test_noise_is_fitted_on_validation_recordings_by_the_closed_forms_precision(
         for run in scorer.runs(item, scorer.score(item, short_lead_steps=3))
     ]
     assert fitted.noise == SensorNoise.fit(squares, NoiseSteps(9, 8, 0.6, 0.7))
+    assert fitted.release == Release(12, 0.8)
 
 
 def test_relations_are_fitted_on_training_recordings(data, trained_twin):

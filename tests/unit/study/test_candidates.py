@@ -8,7 +8,7 @@ import pytest
 
 from odisar.capability.scoring import Scorer
 from odisar.stages.members import MemberData
-from odisar.study.candidates import MARGINS, NOISE, candidates
+from odisar.study.candidates import MARGINS, NOISE, RELEASES, candidates
 from odisar.study.development import fit_statistics, ranked
 from small_bundle import small_case
 from small_system import make_recording
@@ -62,7 +62,8 @@ def test_only_what_uses_the_twin_and_has_noise_beside_can_be_chosen():
         assert one.can_be_chosen == beside == (one.noise_margin is not None)
         assert one.uses_twin or not beside
         if beside:
-            assert float(one.name.rpartition(", ")[2]) == one.noise_margin
+            said = one.name.partition("; or noise of one sensor, ")[2].partition(";")[0]
+            assert float(said) == one.noise_margin
     margins = [one.noise_margin for one in candidates() if one.can_be_chosen]
     assert set(margins) == set(MARGINS)
 
@@ -74,6 +75,18 @@ def test_what_has_noise_beside_stands_in_the_table_without_it_too():
             alone = every[one.name.partition("; or noise")[0]]
             assert (alone.parts, alone.can_be_chosen) == (one.parts - 2, False)
             np.testing.assert_array_equal(alone.of(invented()), one.of(invented()))
+
+
+def test_each_of_those_is_offered_with_every_way_of_letting_go_and_without():
+    chosen = {one.name: one for one in candidates() if one.can_be_chosen}
+    kept = [one for one in chosen.values() if one.release is None]
+    assert len(chosen) == len(kept) * (len(RELEASES) + 1)
+    for one in kept:
+        for release in RELEASES:
+            name = f"{one.name}; release over {release.steps} ({release.share:g})"
+            assert chosen[name].release == release
+            assert (chosen[name].parts, chosen[name].of) == (one.parts, one.of)
+            assert chosen[name].noise_margin == one.noise_margin
 
 
 @pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])
