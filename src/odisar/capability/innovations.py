@@ -28,7 +28,7 @@ _SHRINKAGE = 1.0e-6
 #: What is usual and what is rare on held-out recordings: 0 and 1 on the common scale.
 _USUAL, _RARE = 0.5, 0.99
 #: What is usual and rare isn't known from fewer values.
-_FEWEST = 20
+FEWEST_KNOWN = 20
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
 #: Below it a statistic is called zero; its log must stay finite.
@@ -91,11 +91,12 @@ class LogScale:
     def fit(cls, statistic: FloatArray) -> Self:
         """Fit on (time,) values of held-out recordings; NaN don't count."""
         known = statistic[np.isfinite(statistic)]
-        if len(known) < _FEWEST:
+        if len(known) < FEWEST_KNOWN:
             raise OdisarError(
                 f"{len(known)} samples of validation recordings lie behind the windows of the "
-                f"score, and at least {_FEWEST} must, or nobody knows what is usual; shorten them "
-                "(the steps in cases.*.score of params.yaml), or add longer validation recordings"
+                f"score, and at least {FEWEST_KNOWN} must, or nobody knows what is usual; shorten "
+                "them (the steps in cases.*.score of params.yaml), or add longer validation "
+                "recordings"
             )
         logs = np.log(np.maximum(known, _SMALLEST))
         usual, rare = np.quantile(logs, [_USUAL, _RARE])

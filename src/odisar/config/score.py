@@ -80,3 +80,11 @@ class ScoreConfig(Section):
     scatter: ScatterConfig
     noise: NoiseConfig
     release: ReleaseConfig
+
+    @property
+    def longest_steps(self) -> int:
+        """How many samples with an innovation come before the first score."""
+        parts = (self.innovation, self.consistency)
+        steps = [n for p in parts for n in (p.mean_steps, p.size_steps, p.recent_steps)]
+        scatter = self.scatter.steps if self.scatter.share else 0
+        return max(*steps, scatter, self.noise.lasting_steps + 1)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from odisar.artifacts import Workspace, write_table
+from odisar.capability.innovations import FEWEST_KNOWN
 from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
 from odisar.errors import OdisarError
@@ -20,7 +21,7 @@ from odisar.recordings.reader import read_case
 from odisar.recordings.recipe import check_recipe
 from odisar.recordings.schema import INDEX_COLUMNS, Recording
 from odisar.recordings.store import write_store
-from odisar.stages.members import hours, load_member, pipeline_members
+from odisar.stages.members import MemberData, hours, load_member, pipeline_members
 from odisar.tracking import TrackedRun
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "simulators")
@@ -61,6 +62,7 @@ def split_overview(config: ConfigView, workspace: Workspace) -> pd.DataFrame:
     rows = []
     for member in pipeline_members(config):
         data = load_member(config, workspace, member)
+        require_scores(config.setups[member.setup].case, data)
         for split, group in data.splits.items():
             rows.append(
                 {
@@ -94,6 +96,24 @@ def require_columns(case: Case, recordings: Sequence[Recording]) -> None:
                 f"case {case.title!r}: groups names the metadata column {column!r}, which no "
                 f"recording has; known are {', '.join(sorted(known))}"
             )
+
+
+def require_scores(case_name: str, data: MemberData) -> None:
+    """Raise OdisarError where validation recordings are too short for the windows of the score.
+
+    Before any training, as what is usual is learnt from them after it.
+    """
+    spec, longest = data.spec, data.case.score.longest_steps
+    segments = [segment for item in data.splits["validation"] for segment in item.segments]
+    forecasts = [len(spec.issue_positions(segment, 1, horizon_steps=0)) for segment in segments]
+    known = sum(max(0, count - longest) for count in forecasts)
+    if known < FEWEST_KNOWN:
+        raise OdisarError(
+            f"cases.{case_name}.score: {known} samples of validation recordings lie behind a "
+            f"context of {spec.context_steps} and the score's longest window of {longest}, and "
+            f"at least {FEWEST_KNOWN} must, or nobody knows what is usual; shorten the windows, or "
+            "add longer validation recordings"
+        )
 
 
 def require_disturbed(splits: pd.DataFrame) -> None:

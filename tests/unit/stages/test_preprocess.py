@@ -1,8 +1,18 @@
+"""What stops a run before anything is trained."""
+
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 
+from odisar.capability.innovations import FEWEST_KNOWN
+from odisar.capability.scoring import Scorer
 from odisar.errors import OdisarError
-from odisar.stages.preprocess import require_disturbed
+from odisar.stages.detectors import fit_innovation_scores
+from odisar.stages.members import MemberData
+from odisar.stages.preprocess import require_disturbed, require_scores
+from small_reference import system_case
+from small_system import SPEC, make_recording
 
 
 def splits(*rows: tuple[str, str, int, int]) -> pd.DataFrame:
@@ -23,3 +33,39 @@ def test_a_set_up_whose_groups_select_nothing_disturbed_is_named_with_the_way_ou
 
 def test_one_disturbed_fold_is_enough():
     require_disturbed(splits(("a", "test", 0, 0), ("a", "test", 1, 1), ("a", "train", 0, 0)))
+
+
+def validated_on(*samples: int) -> MemberData:
+    """Return a member whose validation recordings have so many samples."""
+    splits = {
+        "train": [make_recording(f"train-{i}") for i in range(2)],
+        "validation": [make_recording(f"held-out-{i}", n) for i, n in enumerate(samples)],
+    }
+    return MemberData(system_case(), splits, None, SPEC)
+
+
+def before_the_first_score() -> int:
+    return SPEC.context_steps - 1 + system_case().score.longest_steps
+
+
+@pytest.mark.parametrize("shares", [(FEWEST_KNOWN,), (5, FEWEST_KNOWN - 5)])
+def test_validation_recordings_just_long_enough_for_the_score_pass(shares):
+    require_scores("small", validated_on(*(before_the_first_score() + n for n in shares)))
+
+
+@pytest.mark.parametrize("shares", [(FEWEST_KNOWN - 1,), (5, FEWEST_KNOWN - 6), (-30, 3)])
+def test_validation_recordings_too_short_for_the_score_stop_the_run_before_training(shares):
+    left = sum(max(0, n) for n in shares)
+    data = validated_on(*(before_the_first_score() + n for n in shares))
+    with pytest.raises(OdisarError, match=rf"cases\.small\.score: {left} samples .*shorten"):
+        require_scores("small", data)
+
+
+def test_what_passes_can_be_calibrated_and_what_does_not_can_not(trained_twin):
+    scorer = Scorer(trained_twin, 64, "cpu")
+    data = replace(validated_on(before_the_first_score() + 20), scaler=trained_twin.scaler)
+    fitted = fit_innovation_scores(scorer, data)
+    assert fitted.known_after_steps == system_case().score.longest_steps
+    short = replace(validated_on(before_the_first_score() + 19), scaler=trained_twin.scaler)
+    with pytest.raises(OdisarError, match="19 samples of validation recordings"):
+        fit_innovation_scores(scorer, short)
