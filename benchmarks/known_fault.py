@@ -40,14 +40,16 @@ from odisar.windows.scaling import channel_std
 
 Array = NDArray[np.float64]
 
+#: Features of a relative pose: rates along and across the machine.
+ALONG_AND_ACROSS = (0, 1)
 WORKSPACE, KINDS = Path("workspaces/real"), ("noise", "bias", "creep")
 #: Windows of the means that the regression is given, in samples.
 WINDOWS = (3, 5, 10, 20)
 #: Calibration recordings are copied with so many draws of each fault.
 SEEDS = range(4)
 
-#: What a regression is given, as columns of ``Seen.features``: it may learn less from more.
-GIVEN = {"shown, innovations": slice(3 * len(WINDOWS) + 2), "shown, all": slice(None)}
+#: What a regression is given: it may learn less from more.
+GIVEN = INNOVATIONS, ALL = "shown, innovations", "shown, all"
 
 #: Kind, channel and size of a fault.
 Fault = tuple[str, str, str]
@@ -55,9 +57,12 @@ Fault = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Seen:
-    """A faulty recording as a twin saw it: (time, ...) what is known, and what is true."""
+    """A faulty recording as a twin saw it: (time, ...) what is known, and what is true.
 
-    features: Array
+    ``features`` are (time, feature) by what is given.
+    """
+
+    features: dict[str, Array]
     score: Array
     labels: NDArray[np.bool_]
 
@@ -97,46 +102,49 @@ class Watcher:
                 for start, stop in found.runs:
                     seen = found.innovations[start:stop]
                     tied = self._fitted.relations.residuals(found.samples[start:stop])
-                    column = self.column(fault[1])
-                    features = np.hstack(
-                        [
-                            informed(seen, column, self._score),
-                            informed(tied, column, self._fitted.consistency),
-                        ]
-                    )
                     known = slice(self.data.spec.horizon_steps, None)
+                    columns = self.columns(fault[1])
+                    told = informed(seen, columns, self._score)[known]
+                    more = informed(tied, columns, self._fitted.consistency)[known]
+                    features = {INNOVATIONS: told, ALL: np.hstack([told, more])}
                     run = slice(start + self.data.spec.horizon_steps, stop)
-                    yield fault, Seen(features[known], score[run], labels[run])
+                    yield fault, Seen(features, score[run], labels[run])
 
-    def column(self, channel: str) -> int:
-        """Return where a channel stands among the state features."""
+    def columns(self, channel: str) -> list[int]:
+        """Return where a channel stands among the state features.
+
+        A position of a relative pose shows along and across the machine, by where it heads.
+        """
         spec, names = self.data.spec, list(self.data.case.channel_names)
-        (feature,) = feature_positions([names.index(channel)], len(names), spec.pose)
-        return spec.state_features(len(names)).index(feature)
+        at, states = names.index(channel), spec.state_features(len(names))
+        if spec.pose is not None and at in (spec.pose.x, spec.pose.y):
+            return [states.index(feature) for feature in ALONG_AND_ACROSS]
+        (feature,) = feature_positions([at], len(names), spec.pose)
+        return [states.index(feature)]
 
     def usual(self, channel: str) -> float:
         """Return the spread of a channel's innovations given all others, in the channel's unit."""
-        spec, names = self.data.spec, list(self.data.case.channel_names)
-        (feature,) = feature_positions([names.index(channel)], len(names), spec.pose)
-        column = self.column(channel)
+        spec, column = self.data.spec, self.columns(channel)[0]
+        feature = spec.state_features(len(self.data.case.channels))[column]
         scaled = 1 / np.sqrt(self._score.size.precision[column, column])
         return float(scaled * self.data.scaler.std[feature])
 
 
-def informed(innovations: Array, column: int, score: InnovationScore) -> Array:
+def informed(innovations: Array, columns: Sequence[int], score: InnovationScore) -> Array:
     """Return (time, feature) what the regression is given of innovations or parity residuals.
 
     Means over several windows of the guilty channel given all others (its size, and with its
     sign) and of what leans its way, and the monitor's own two statistics.
     """
     precision = score.size.precision
-    own = (innovations @ precision)[:, column] / np.sqrt(precision[column, column])
     limit = score.mean.limit
     drawn_in = innovations if limit is None else limit.of(innovations)
-    lean = (drawn_in @ precision)[:, column]
-    given = [
-        moving_mean(part, steps) for steps in WINDOWS for part in (np.log1p(own**2), own, lean)
-    ]
+    given: list[Array] = []
+    for column in columns:
+        own = (innovations @ precision)[:, column] / np.sqrt(precision[column, column])
+        lean = (drawn_in @ precision)[:, column]
+        parts = np.log1p(own**2), own, lean
+        given += [moving_mean(part, steps) for steps in WINDOWS for part in parts]
     return np.column_stack([*given, *score.parts(innovations)])
 
 
@@ -151,14 +159,12 @@ def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
         for fault, seen in watcher.watch(copies):
             shown.setdefault(fault, []).append(seen)
         models = {
-            (name, fault): Told.by(parts, columns)
-            for fault, parts in shown.items()
-            for name, columns in GIVEN.items()
+            (name, fault): Told.by(parts, name) for fault, parts in shown.items() for name in GIVEN
         }
         for fault, seen in watcher.watch(test):
-            known = np.isfinite(seen.features).all(axis=1) & np.isfinite(seen.score)
+            known = np.isfinite(seen.features[ALL]).all(axis=1) & np.isfinite(seen.score)
             for name in GIVEN:
-                said = models[name, fault].score(seen.features[known])
+                said = models[name, fault].score(seen.features[name][known])
                 told.setdefault((name, fault), []).append(said)
             untold.setdefault(fault, []).append(seen.score[known])
             truth.setdefault(fault, []).append(seen.labels[known])
@@ -179,26 +185,25 @@ def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
 class Told:
     """A regression of what is true on what is known; folds are put on one scale."""
 
-    columns: slice
     model: Pipeline
     usual: float
     spread: float
 
     @classmethod
-    def by(cls, parts: Sequence[Seen], columns: slice) -> "Told":
+    def by(cls, parts: Sequence[Seen], given: str) -> "Told":
         """Train on faulty calibration recordings; their healthy part says what is usual."""
-        features = np.concatenate([part.features[:, columns] for part in parts])
+        features = np.concatenate([part.features[given] for part in parts])
         labels = np.concatenate([part.labels for part in parts])
         known = np.isfinite(features).all(axis=1)
         features, labels = features[known], labels[known]
         model = make_pipeline(StandardScaler(), LogisticRegression(max_iter=2000))
         model.fit(features, labels)
         healthy = model.decision_function(features[~labels])
-        return cls(columns, model, float(healthy.mean()), float(healthy.std()))
+        return cls(model, float(healthy.mean()), float(healthy.std()))
 
     def score(self, features: Array) -> Array:
         """Return (time,) how sure it is of the fault, in standard deviations of the healthy."""
-        said = self.model.decision_function(features[:, self.columns])
+        said = self.model.decision_function(features)
         return np.asarray((said - self.usual) / self.spread)
 
 
