@@ -1,6 +1,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from odisar.artifacts import write_json
 from odisar.config.loader import load_config
@@ -146,6 +147,20 @@ def test_a_figure_is_the_same_bytes_twice_and_names_no_program(results, tmp_path
     one, two = (path.read_bytes() for path in paths)
     assert one == two
     assert b"Software" not in one
+
+
+def test_a_figure_has_a_palette_that_no_eye_tells_from_all_its_colours(results, tmp_path):
+    path = tmp_path / "drawn.png"
+    figure = baselines_by_strength(results, "vessel-all")
+    save_figure(figure, path, "strengths")
+    drawn = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+    with Image.open(path) as saved:
+        assert saved.mode == "P"
+        assert saved.info["dpi"] == pytest.approx((150, 150), abs=0.1)
+        shown = np.asarray(saved.convert("RGB")).astype(int)
+    below_the_title = shown[-len(drawn) :]
+    assert below_the_title.shape == drawn.shape
+    assert np.abs(below_the_title - drawn).max() <= 24
 
 
 def test_bars_of_quadrants_are_stacked_to_all_windows(results):
