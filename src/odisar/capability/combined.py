@@ -27,8 +27,9 @@ RELEASED = (ODISAR, WITHOUT_TRANSFORMER, CLOSED_FORM)
 
 #: Scatter counts no more than this, what is rare, on the common log scale.
 SATURATED = 1.0
-#: However far out a statistic is, its score stays finite in single precision, and so in JSON.
-_LARGEST = 1.0e30
+#: However far out a statistic is, or has been before it was let go of, its score stays finite and
+#: above zero in single precision, and so in JSON.
+_SMALLEST, _LARGEST = 1.0e-30, 1.0e30
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,10 @@ class InnovationScores:
             logs = self.scales[name].of(made[name])
             heard = logs if name == CLOSED_FORM else np.maximum(logs, noise)
             made[name] = np.exp(self.release.of(heard))
-        return {name: np.minimum(part, _LARGEST).astype(np.float32) for name, part in made.items()}
+        return {
+            name: np.clip(part, _SMALLEST, _LARGEST).astype(np.float32)
+            for name, part in made.items()
+        }
 
 
 def _geometric_mean(*weighed: tuple[FloatArray, float]) -> FloatArray:

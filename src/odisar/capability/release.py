@@ -19,8 +19,9 @@ class Release:
 
     A statistic of a window stays up until the last sample of a strong disturbance has left it. By
     how much the score has fallen below its peak within the last ``steps`` says that it is over:
-    ``share`` of that is taken off as well. What is weak leaves no such peak, and is left alone; but
-    something weak that follows at once on something strong is let go of with it.
+    ``share`` of that, as far as it is more than an event's own rise and fall and the peak was
+    strong, is taken off as well. What is weak leaves no such peak, and is left alone; but something
+    weak that follows at once on something strong is let go of with it.
     """
 
     steps: int
@@ -29,10 +30,9 @@ class Release:
     def of(self, logs: FloatArray) -> FloatArray:
         """Return (time,) scores along one gapless run, given and returned on the common log scale.
 
-        A peak is sought among the scores that are known; NaN stay NaN.
+        A peak is sought among the scores that are finite; NaN and infinite ones stay so.
         """
-        if not self.share:
-            return logs
-        peaks = pd.Series(logs).rolling(self.steps, min_periods=1).max().to_numpy()
+        steps = min(self.steps, len(logs) + 1)
+        peaks = pd.Series(logs).rolling(steps, min_periods=1).max().to_numpy()
         fallen = peaks - np.maximum(logs + _UNDULATION, _STRONG)
-        return np.asarray(logs - self.share * np.maximum(fallen, 0.0))
+        return np.asarray(logs - self.share * np.fmax(fallen, 0.0))

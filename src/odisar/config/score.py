@@ -60,8 +60,9 @@ class NoiseConfig(Section):
 class ReleaseConfig(Section):
     """How a score lets go of something strong that is over.
 
-    ``share`` of its fall below its highest value within the last ``steps`` samples is taken off as
-    well, where that was strong and it has fallen far. A share of 0 leaves scores as they are.
+    Where its highest value within the last ``steps`` samples was strong and it has fallen far below
+    that, ``share`` of so much of the fall is taken off as well (see ``capability.release``). A
+    share of 0 leaves scores as they are.
     """
 
     steps: PositiveInt
@@ -83,7 +84,7 @@ class ScoreConfig(Section):
 
     @property
     def longest_steps(self) -> int:
-        """How many samples with an innovation come before the first score."""
+        """How many steps after its first forecast a run has its first score, at the latest."""
         parts = (self.innovation, self.consistency)
         steps = [n for p in parts for n in (p.mean_steps, p.size_steps, p.recent_steps)]
         scatter = self.scatter.steps if self.scatter.share else 0

@@ -104,8 +104,9 @@ def require_scores(case_name: str, data: MemberData) -> None:
     Before any training, as what is usual is learnt from them after it.
     """
     spec, longest = data.spec, data.case.score.longest_steps
+    ahead = spec.horizon_steps if spec.known_ahead else 0
     segments = [segment for item in data.splits["validation"] for segment in item.segments]
-    forecasts = [len(spec.issue_positions(segment, 1, horizon_steps=0)) for segment in segments]
+    forecasts = [len(spec.issue_positions(segment, 1, horizon_steps=ahead)) for segment in segments]
     known = sum(max(0, count - longest) for count in forecasts)
     if known < FEWEST_KNOWN:
         raise OdisarError(

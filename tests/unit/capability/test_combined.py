@@ -20,6 +20,7 @@ from odisar.capability.combined import (
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import LogScale
 from odisar.capability.outliers import NoiseSteps, SensorNoise
+from odisar.capability.release import Release
 from odisar.recordings.schema import Recording
 from odisar.seeding import generator
 from small_innovations import STEPS as SMALL_STEPS
@@ -89,6 +90,19 @@ def test_every_mean_on_the_log_scale_lets_go_of_something_strong_that_is_over(sc
     assert (found[220:230] < mean[220:230] - 0.5).any()
 
 
+@pytest.mark.parametrize("name", HEARING)
+def test_noise_of_one_sensor_that_is_over_is_let_go_of_as_well(scores, name):
+    run = invented_run("fresh", 300)
+    squares = np.zeros(run.innovations.shape)
+    squares[200:220] = 1e30
+    run = replace(run, outliers=lambda _: squares)
+    mean = scores.scales[name].of(scores.parts.of(run)[name])
+    found = np.log(scores.of(run)[name])
+    wanted = scores.release.of(np.maximum(mean, noise_of(scores, run)))
+    np.testing.assert_allclose(found, wanted, atol=1e-5)
+    assert (found[220:230] < mean[220:230] - 0.5).any()
+
+
 def test_noise_raises_the_whole_and_neither_the_closed_form_nor_consistency(scores):
     calm = scores.of(with_outliers(invented_run("fresh"), 0.0))
     loud = scores.of(with_outliers(invented_run("fresh"), 1e4))
@@ -106,6 +120,17 @@ def test_whatever_a_sensor_reads_the_whole_stays_a_number(scores):
     for name in HEARING:
         assert np.isfinite(scores.of(extreme)[name][known]).all()
         assert scores.of(extreme)[name][known].min() > scores.of(run)[name][known].max()
+
+
+def test_after_whatever_a_sensor_has_read_scores_stay_above_zero(scores):
+    run = invented_run("fresh", 300)
+    innovations, closed_form = run.innovations.copy(), run.closed_form.copy()
+    for struck in (innovations, closed_form):
+        struck[200:220] *= 1e150
+    extreme = replace(run, innovations=innovations, closed_form=closed_form)
+    found = replace(scores, release=Release(8, 1.0)).of(extreme)
+    for name in RELEASED:
+        assert (found[name][scores.known_after_steps :] > 0).all()
 
 
 def test_the_filter_is_asked_with_the_precision_of_the_closed_forms_innovations(scores):

@@ -157,6 +157,7 @@ def test_relations_that_can_be_none_are_refused(content, key, value, complaint):
         (("scales", "odisar"), {"usual": 1.0, "rare": 0.0}, "must be above usual=1.0"),
         (("scales", "closed-form"), {"usual": 0.0}, "scales.closed-form.rare"),
         (("scales", "other"), {"usual": 0.0, "rare": 1.0}, "expected odisar, without-transformer"),
+        (("scales",), {"odisar": {"usual": 0.0, "rare": 1.0}}, "without-transformer, closed-form"),
         (("release", "steps"), 0, "greater than 0"),
         (("release", "share"), 1.1, "less than or equal to 1"),
         (("release", "share"), -0.1, "greater than or equal to 0"),

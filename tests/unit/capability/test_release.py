@@ -45,6 +45,25 @@ def test_unknown_scores_stay_unknown_and_are_no_peak():
     np.testing.assert_allclose(found[2:], [3.0, 0.5, 0.5])
 
 
+def test_unknown_scores_in_between_hide_no_peak():
+    logs = np.array([5.0, np.nan, 1.0, np.nan, 1.0])
+    np.testing.assert_allclose(Release(3, 1.0).of(logs), [5.0, np.nan, -1.5, np.nan, 1.0])
+
+
+def test_infinite_scores_stay_infinite_for_as_long_as_they_last():
+    logs = np.array([np.nan, np.inf, np.inf, np.inf, 1.0])
+    np.testing.assert_array_equal(Release(2, 1.0).of(logs), logs)
+
+
+@pytest.mark.parametrize("steps", [3, 4, 10**30])
+def test_what_looks_back_further_than_a_run_lasts_knows_all_of_it(steps):
+    np.testing.assert_allclose(Release(steps, 0.5).of(np.array([4.0, 1.0, 1.0])), [4, 0.25, 0.25])
+
+
+def test_a_run_without_a_sample_has_no_score():
+    assert Release(3, 0.5).of(np.empty(0)).shape == (0,)
+
+
 def test_without_a_share_scores_are_as_they_were():
     logs = np.array([9.0, 0.0, 3.0])
     np.testing.assert_array_equal(Release(3, 0.0).of(logs), logs)

@@ -54,6 +54,29 @@ def test_no_margin_no_scatter_and_no_release_are_declared_by_zero(score, part, k
     assert getattr(getattr(ScoreConfig.model_validate(score), part), key) == 0
 
 
+@pytest.mark.parametrize(
+    ("part", "changes", "longest"),
+    [
+        ("innovation", {"mean_steps": 50}, 50),
+        ("innovation", {"size_steps": 50}, 50),
+        ("innovation", {"recent_steps": 50}, 50),
+        ("consistency", {"mean_steps": 50}, 50),
+        ("consistency", {"size_steps": 50}, 50),
+        ("consistency", {"recent_steps": 50}, 50),
+        ("scatter", {"steps": 50}, 50),
+        ("scatter", {"steps": 50, "share": 0.0}, 10),
+        # Of two innovations the first can't be judged.
+        ("noise", {"lasting_steps": 50}, 51),
+        ("release", {"steps": 50}, 10),
+    ],
+)
+def test_the_longest_window_that_counts_says_when_the_first_score_is_known(
+    score, part, changes, longest
+):
+    score[part] = score[part] | changes
+    assert ScoreConfig.model_validate(score).longest_steps == longest
+
+
 def test_recent_noise_is_no_older_than_lasting_noise(score):
     score["noise"] |= {"lasting_steps": 4, "recent_steps": 5}
     with pytest.raises(ValidationError, match=r"recent_steps=5 must not be above lasting_steps=4"):

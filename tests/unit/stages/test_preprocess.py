@@ -1,6 +1,7 @@
 """What stops a run before anything is trained."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -8,9 +9,10 @@ import pytest
 from odisar.capability.innovations import FEWEST_KNOWN
 from odisar.capability.scoring import Scorer
 from odisar.errors import OdisarError
+from odisar.stages import preprocess
 from odisar.stages.detectors import fit_innovation_scores
-from odisar.stages.members import MemberData
-from odisar.stages.preprocess import require_disturbed, require_scores
+from odisar.stages.members import Member, MemberData
+from odisar.stages.preprocess import require_disturbed, require_scores, split_overview
 from small_reference import system_case
 from small_system import SPEC, make_recording
 
@@ -59,6 +61,35 @@ def test_validation_recordings_too_short_for_the_score_stop_the_run_before_train
     data = validated_on(*(before_the_first_score() + n for n in shares))
     with pytest.raises(OdisarError, match=rf"cases\.small\.score: {left} samples .*shorten"):
         require_scores("small", data)
+
+
+def test_no_window_of_the_score_crosses_a_gap():
+    half = before_the_first_score() + 9
+    data = validated_on(2 * half)
+    (item,) = data.splits["validation"]
+    data.splits["validation"] = [replace(item, segments=((0, half), (half, 2 * half)))]
+    with pytest.raises(OdisarError, match="18 samples of validation recordings"):
+        require_scores("small", data)
+
+
+def test_where_commands_are_known_ahead_the_last_horizon_has_no_score():
+    spec = replace(SPEC, known_ahead=(0,))
+    needed = before_the_first_score() + FEWEST_KNOWN + SPEC.horizon_steps
+    require_scores("small", replace(validated_on(needed), spec=spec))
+    with pytest.raises(OdisarError, match="19 samples of validation recordings"):
+        require_scores("small", replace(validated_on(needed - 1), spec=spec))
+
+
+def test_every_member_is_asked_before_anything_is_trained(monkeypatch):
+    members = {"long": validated_on(300), "short": validated_on(before_the_first_score())}
+    monkeypatch.setattr(
+        preprocess, "pipeline_members", lambda _: [Member(name, None) for name in members]
+    )
+    monkeypatch.setattr(preprocess, "load_member", lambda *given: members[given[-1].setup])
+    monkeypatch.setattr(MemberData, "windows", lambda *_: [])
+    setups = {name: SimpleNamespace(case=f"case-of-{name}") for name in members}
+    with pytest.raises(OdisarError, match=r"cases\.case-of-short\.score: 0 samples"):
+        split_overview(SimpleNamespace(setups=setups), None)
 
 
 def test_what_passes_can_be_calibrated_and_what_does_not_can_not(trained_twin):

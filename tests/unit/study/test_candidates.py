@@ -7,6 +7,8 @@ import pandas as pd
 import pytest
 
 from odisar.capability.scoring import Scorer
+from odisar.config.loader import load_config
+from odisar.stages.detectors import score_steps
 from odisar.stages.members import MemberData
 from odisar.study.candidates import MARGINS, NOISE, RELEASES, candidates
 from odisar.study.development import fit_statistics, ranked
@@ -87,6 +89,13 @@ def test_each_of_those_is_offered_with_every_way_of_letting_go_and_without():
             assert chosen[name].release == release
             assert (chosen[name].parts, chosen[name].of) == (one.parts, one.of)
             assert chosen[name].noise_margin == one.noise_margin
+
+
+def test_shipped_cases_let_go_and_hear_noise_in_ways_that_are_offered(request):
+    for case in load_config(request.config.rootpath).cases.values():
+        steps = score_steps(case.score)
+        assert steps.release in RELEASES
+        assert steps.noise.margin in MARGINS
 
 
 @pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])

@@ -33,8 +33,10 @@ def disturbed(name: str, components: str, push: float) -> Recording:
 @pytest.fixture(scope="module")
 def data(trained_twin) -> MemberData:
     splits = {split: [make_recording(name) for name in names] for split, names in SPLITS.items()}
+    wind = disturbed("wind", "wind", 0.05)
     splits["development"] = [
-        disturbed("wind", "wind", 0.05),
+        # A gap soon after the wind is over: what follows knows nothing of its peak.
+        replace(wind, segments=((0, 210), (210, 300))),
         disturbed("waves", "waves", 0.05),
         disturbed("more-waves", "waves", 0.05),
         make_recording("clean"),
@@ -148,7 +150,8 @@ def test_noise_less_its_margin_counts_where_it_is_rarer_than_the_mean(table, dat
             counted += np.count_nonzero(noise > mean)
             mean = np.maximum(mean, noise)
             if one.release is not None:
-                kept, mean = mean, one.release.of(mean)
+                runs = [one.release.of(mean[start:stop]) for start, stop in scores.runs]
+                kept, mean = mean, np.concatenate(runs)
                 let_go += np.count_nonzero(mean < kept)
         known = np.isfinite(mean) & (np.arange(len(mean)) >= SPEC.horizon_steps)
         assert judged.auroc[one.name] == pytest.approx(auroc(mean[known], labels[known]))
