@@ -4,14 +4,14 @@ An extended Kalman filter knows the ferry's hull, its loading, its thrusters and
 as the simulator has them; what it does not know is the light weather that is normal, and the
 disturbance. Its process noise is fitted on undisturbed validation recordings by the likelihood of
 their innovations (Bar-Shalom, Li and Kirubarajan, 2001, chapter 5); its innovations are then judged
-as the twin's are, on the test recordings, by protocol P2. Run it from the project's root after
-`make repro`:
+as the twin's are, on the test recordings, by protocol P2; F1 is at mu + k sigma of its scores of
+calibration recordings. Run it from the project's root after `make repro`:
 
     .venv/bin/python benchmarks/true_model_observer.py
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from sklearn.metrics import f1_score
 
 from odisar.artifacts import Workspace
-from odisar.capability.combined import SATURATED, ScoreSteps
+from odisar.capability.combined import SATURATED
 from odisar.capability.innovations import InnovationScore, InnovationSize, LogScale
+from odisar.capability.release import Release
 from odisar.capability.thresholds import sigma_threshold
 from odisar.config.loader import load_config
 from odisar.config.score import ScoreConfig
@@ -142,33 +143,40 @@ def fit_process_noise(observer: Observer, fleet: Fleet) -> Array:
 
 
 @dataclass(frozen=True)
+class Mean:
+    """The mean of statistics and of scatter, as of the closed form alone."""
+
+    score: InnovationScore
+    scatter: InnovationSize
+    share: float
+
+    def of(self, innovations: Array) -> Array:
+        """Return (time,) the mean along one run."""
+        logs = np.log(self.score.score(innovations, np.zeros(len(innovations))))
+        scatter = np.minimum(self.scatter.scale.of(self.scatter.statistic(innovations)), SATURATED)
+        return np.asarray(np.exp((1 - self.share) * logs + self.share * scatter))
+
+
+@dataclass(frozen=True)
 class Judge:
     """The statistics that the monitor has of innovations, scatter that adds up among them."""
 
-    score_of_innovations: InnovationScore
-    scatter: InnovationSize
-    steps: ScoreSteps
-    scale: LogScale | None = None
+    mean: Mean
+    scale: LogScale
+    release: Release
 
     @classmethod
     def fit(cls, runs: Sequence[Array], config: ScoreConfig) -> "Judge":
         """Fit on innovations (time, state) of undisturbed recordings."""
         steps = score_steps(config)
         score = InnovationScore.fit(runs, None, steps.innovation)
-        made = cls(score, InnovationSize.fit(runs, steps.scatter), steps)
-        return replace(made, scale=LogScale.fit(np.concatenate([made.mean(run) for run in runs])))
-
-    def mean(self, innovations: Array) -> Array:
-        """Return (time,) the mean of statistics along one run, as of the closed form alone."""
-        logs = np.log(self.score_of_innovations.score(innovations, np.zeros(len(innovations))))
-        scatter = self.scatter.scale.of(self.scatter.statistic(innovations))
-        share = self.steps.scatter_share
-        return np.asarray(np.exp((1 - share) * logs + share * np.minimum(scatter, SATURATED)))
+        mean = Mean(score, InnovationSize.fit(runs, steps.scatter), steps.scatter_share)
+        scale = LogScale.fit(np.concatenate([mean.of(run) for run in runs]))
+        return cls(mean, scale, steps.release)
 
     def score(self, innovations: Array) -> Array:
-        """Return (time,) scores of one run: their mean, let go of what is over."""
-        assert self.scale is not None  # noqa: S101 (fitted)
-        return np.exp(self.steps.release.of(self.scale.of(self.mean(innovations))))
+        """Return (time,) scores of one run: its mean, let go of what is over."""
+        return np.exp(self.release.of(self.scale.of(self.mean.of(innovations))))
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from odisar.config.score import FEWEST_KNOWN
 from odisar.errors import OdisarError
 
 FloatArray = NDArray[np.float64]
@@ -27,8 +28,6 @@ FloatArray = NDArray[np.float64]
 _SHRINKAGE = 1.0e-6
 #: What is usual and what is rare on held-out recordings: 0 and 1 on the common scale.
 _USUAL, _RARE = 0.5, 0.99
-#: What is usual and rare isn't known from fewer values.
-FEWEST_KNOWN = 20
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
 #: Below it a statistic is called zero; its log must stay finite.

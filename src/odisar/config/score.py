@@ -6,6 +6,9 @@ from pydantic import Field, model_validator
 
 from odisar.config.base import NonNegativeFloat, PositiveInt, Section
 
+#: What is usual and rare on held-out recordings isn't known from fewer scores.
+FEWEST_KNOWN = 20
+
 _Weight = Annotated[float, Field(ge=0, lt=1)]
 _Share = Annotated[float, Field(ge=0, le=1)]
 

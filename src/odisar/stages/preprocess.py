@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import pandas as pd
 
 from odisar.artifacts import Workspace, write_table
-from odisar.capability.innovations import FEWEST_KNOWN
 from odisar.config.cases import Case
 from odisar.config.loader import ConfigView
+from odisar.config.score import FEWEST_KNOWN
 from odisar.errors import OdisarError
 from odisar.recordings.faults import FAULT_COLUMNS
 from odisar.recordings.quality import (

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from odisar.capability.innovations import FEWEST_KNOWN
 from odisar.capability.scoring import Scorer
+from odisar.config.score import FEWEST_KNOWN
 from odisar.errors import OdisarError
 from odisar.stages import preprocess
 from odisar.stages.detectors import fit_innovation_scores
