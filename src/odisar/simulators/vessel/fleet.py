@@ -1,10 +1,16 @@
 """The fleet: which runs exist, what each is called, and which of them share a seed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
-from odisar.config.simulators import Maneuver, ManeuversConfig, VesselSimulatorConfig
+from odisar.config.simulators import (
+    ComponentRuns,
+    DisturbedRuns,
+    Maneuver,
+    ManeuversConfig,
+    VesselSimulatorConfig,
+)
 from odisar.recordings.schema import UNDISTURBED
 
 #: Components of a run in which the case disturbs all that it can.
@@ -33,7 +39,7 @@ class RunPlan:
 
 def plan_fleet(config: VesselSimulatorConfig) -> list[RunPlan]:
     """Return every run of the configuration, always in the same order, each name once."""
-    return [*_clean_runs(config), *_disturbed_runs(config), *_one_component_runs(config)]
+    return [*_clean_runs(config), *_disturbed_runs(config)]
 
 
 def variants(maneuvers: ManeuversConfig) -> Iterator[tuple[Maneuver, str]]:
@@ -62,35 +68,31 @@ def _is_light(replicate: int, share: float) -> bool:
 
 
 def _disturbed_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
-    for split, runs in config.fleet.disturbed.items():
-        for maneuver, variant in variants(config.maneuvers):
-            for case in runs.cases:
-                seed_name = f"{split}-{maneuver}-{variant}-{case}"
-                for strength in runs.strengths:
-                    yield RunPlan(
-                        name=f"{seed_name}-s{strength:g}",
-                        seed_name=seed_name,
-                        split=split,
-                        maneuver=maneuver,
-                        variant=variant,
-                        disturbance=case,
-                        components=ALL_COMPONENTS,
-                        strength=strength,
-                    )
+    """Yield the runs in which all is disturbed, then those in which one component is."""
+    for split, whole in config.fleet.disturbed.items():
+        yield from _event_runs(config, split, whole, {ALL_COMPONENTS: ""})
+    for split, parts in config.fleet.one_component.items():
+        named = {name: f"-{name}" for name in parts.components}
+        yield from _event_runs(config, split, parts, named)
 
 
-def _one_component_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
-    for split, runs in config.fleet.one_component.items():
-        for (maneuver, variant), case in product(variants(config.maneuvers), runs.cases):
-            seed_name = f"{split}-{maneuver}-{variant}-{case}"
-            for component, strength in product(runs.components, runs.strengths):
-                yield RunPlan(
-                    name=f"{seed_name}-{component}-s{strength:g}",
-                    seed_name=seed_name,
-                    split=split,
-                    maneuver=maneuver,
-                    variant=variant,
-                    disturbance=case,
-                    components=component,
-                    strength=strength,
-                )
+def _event_runs(
+    config: VesselSimulatorConfig,
+    split: str,
+    runs: DisturbedRuns | ComponentRuns,
+    components: Mapping[str, str],
+) -> Iterator[RunPlan]:
+    """Yield every variant in every case; ``components`` map each to what names say of it."""
+    for (maneuver, variant), case in product(variants(config.maneuvers), runs.cases):
+        seed_name = f"{split}-{maneuver}-{variant}-{case}"
+        for (component, part), strength in product(components.items(), runs.strengths):
+            yield RunPlan(
+                name=f"{seed_name}{part}-s{strength:g}",
+                seed_name=seed_name,
+                split=split,
+                maneuver=maneuver,
+                variant=variant,
+                disturbance=case,
+                components=component,
+                strength=strength,
+            )
