@@ -72,7 +72,7 @@ def _disturbed_runs(config: VesselSimulatorConfig) -> Iterator[RunPlan]:
     for split, whole in config.fleet.disturbed.items():
         yield from _event_runs(config, split, whole, {ALL_COMPONENTS: ""})
     for split, parts in config.fleet.one_component.items():
-        named = {name: f"-{name}" for name in parts.components}
+        named: dict[str, str] = {name: f"-{name}" for name in parts.components}
         yield from _event_runs(config, split, parts, named)
 
 
