@@ -6,9 +6,10 @@ import numpy as np
 
 from odisar.capability.combined import InnovationScores, Run, ScoreSteps
 from odisar.capability.consistency import Consistency
-from odisar.capability.innovations import InnovationSteps, conditional_squares
+from odisar.capability.innovations import InnovationSteps, conditional_squares, squared_distance
 from odisar.capability.outliers import NoiseSteps
 from odisar.capability.release import Release
+from odisar.capability.shifts import ShiftSteps
 from odisar.seeding import generator
 
 STATES = (0, 1)
@@ -18,6 +19,7 @@ STEPS = ScoreSteps(
     scatter=7,
     scatter_share=0.15,
     noise=NoiseSteps(lasting=5, recent=2, recent_share=0.4, margin=0.3),
+    shift=ShiftSteps(memory=9, margin=0.25),
     release=Release(steps=8, share=0.5),
 )
 
@@ -32,7 +34,13 @@ def invented_run(stream: str, samples: int = 200) -> Run:
     seen = random.normal(size=(samples, len(STATES) + 1)).astype(np.float32)
     seen[:, 1] += 4 * seen[:, 2]
     errors = np.exp(random.normal(size=samples))
-    return Run(innovations, closed_form, seen, errors, partial(conditional_squares, wrong))
+    wrongly = partial(conditional_squares, wrong)
+    return Run(innovations, closed_form, seen, errors, wrongly, invented_ratios)
+
+
+def invented_ratios(innovations: np.ndarray, precision: np.ndarray, memory: int) -> np.ndarray:
+    """Return ratios of shifts that depend on all that they may: none but these."""
+    return squared_distance(innovations, precision) / memory
 
 
 def invented_scores(steps: ScoreSteps = STEPS) -> InnovationScores:

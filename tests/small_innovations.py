@@ -10,6 +10,7 @@ from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps
 from odisar.capability.release import Release
 from odisar.capability.scoring import Scorer
+from odisar.capability.shifts import ShiftSteps
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from small_system import make_recording
@@ -20,6 +21,7 @@ STEPS = ScoreSteps(
     scatter=9,
     scatter_share=0.2,
     noise=NoiseSteps(lasting=6, recent=2, recent_share=0.5, margin=0.2),
+    shift=ShiftSteps(memory=12, margin=0.2),
     release=Release(steps=8, share=0.5),
 )
 #: The first score is known so many steps after the first forecast.

@@ -17,6 +17,7 @@ SCORE = {
     "consistency": dict(_STATISTICS),
     "scatter": {"steps": 10, "share": 0.2},
     "noise": {"lasting_steps": 6, "recent_steps": 2, "recent_share": 0.5, "margin": 0.2},
+    "shift": {"memory_steps": 12, "margin": 0.2},
     "release": {"steps": 8, "share": 0.5},
 }
 

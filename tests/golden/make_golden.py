@@ -37,6 +37,7 @@ from odisar.capability.innovations import (
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
 from odisar.capability.scoring import RECONSTRUCTION, Scorer
+from odisar.capability.shifts import ShiftSteps, StateShift
 from odisar.config.cases import Groups
 from odisar.config.judging import Judging, OperatingPoint
 from odisar.config.learning import TwinConfig
@@ -170,7 +171,8 @@ def analytic_scores() -> InnovationScores:
         WITHOUT_TRANSFORMER: LogScale(-0.4, 1.3),
         CLOSED_FORM: LogScale(-0.2, 1.1),
     }
-    return InnovationScores(parts, noise, scales, Release(steps=6, share=0.5))
+    shift = StateShift(ShiftSteps(memory=9, margin=0.3), LogScale(0.0, 2.3), LogScale(0.1, 2.2))
+    return InnovationScores(parts, noise, shift, scales, Release(steps=6, share=0.5))
 
 
 def analytic_relations() -> Consistency:

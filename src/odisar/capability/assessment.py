@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odisar.capability.attribution import top_states
-from odisar.capability.combined import ODISAR
+from odisar.capability.combined import ODISAR, RARE
 from odisar.capability.innovations import FloatArray
 from odisar.capability.quadrants import quadrant
 from odisar.capability.responses import blamed_names, state_directions
@@ -169,8 +169,8 @@ def blame_windows(
         own = windows[(windows >= start) & (windows < stop)]
         directions = state_directions(scorer.twin, recording, scores.positions[start:stop])
         innovations = scores.innovations[start:stop]
-        samples = scores.samples[start:stop]
-        parts.append(signatures.blame(innovations, samples, own - start, directions))
+        samples, is_rare = scores.samples[start:stop], scores.scores[ODISAR][start:stop] >= RARE
+        parts.append(signatures.blame(innovations, samples, own - start, directions, is_rare))
     return np.concatenate(parts)
 
 

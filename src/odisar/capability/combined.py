@@ -17,6 +17,7 @@ from odisar.capability.innovations import (
 )
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
+from odisar.capability.shifts import ShiftSteps, StateShift
 
 #: The monitor's score, and the same without its Transformer.
 ODISAR, WITHOUT_TRANSFORMER = "odisar", "without-transformer"
@@ -27,6 +28,8 @@ RELEASED = (ODISAR, WITHOUT_TRANSFORMER, CLOSED_FORM)
 
 #: Scatter counts no more than this, what is rare, on the common log scale.
 SATURATED = 1.0
+#: What scores of ``RELEASED`` rarely are on held-out recordings.
+RARE = float(np.e)
 #: However far out a statistic is, or has been before it was let go of, its score stays finite and
 #: above zero in single precision, and so in JSON.
 _SMALLEST, _LARGEST = 1.0e-30, 1.0e30
@@ -38,7 +41,8 @@ class Run:
 
     ``innovations`` of the twin and ``closed_form`` are (window, state feature), ``samples``
     (window, feature), ``reconstruction`` errors (window,). ``outliers`` returns (window, state)
-    squares of the outlier filter, given the precision of the closed form's innovations.
+    squares of the outlier filter, given the precision of the closed form's innovations; ``shifts``
+    (window,) ratios of the shift filter, given innovations, their precision and a memory.
     """
 
     innovations: FloatArray
@@ -46,6 +50,7 @@ class Run:
     samples: NDArray[np.float32]
     reconstruction: FloatArray
     outliers: Callable[[FloatArray], FloatArray]
+    shifts: Callable[[FloatArray, FloatArray, int], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,7 @@ class ScoreSteps:
     scatter: int
     scatter_share: float
     noise: NoiseSteps
+    shift: ShiftSteps | None
     release: Release
 
 
@@ -160,15 +166,17 @@ class MeanParts:
 
 @dataclass(frozen=True)
 class InnovationScores:
-    """The monitor's score: the mean of its parts, or the noise of one sensor, whichever is rarer.
+    """The monitor's score: the mean of its parts, one sensor's noise or shift, whichever is rarer.
 
-    A mean would dilute one noisy sensor, which the other parts hardly see; so ``noise`` stands
-    beside it. ``scales`` put means, by detector, on noise's log scale: 1 is what is usual on
-    held-out recordings, e what is rare. ``release`` lets them go when something strong is over.
+    A mean would dilute one noisy sensor, which the other parts hardly see, and one that reads
+    wrong, which they soon forget; so ``noise`` and ``shift``, where it is sought, stand beside it.
+    ``scales`` put means, by detector, on the same log scale: 1 is what is usual on held-out
+    recordings, e what is rare. ``release`` lets them go when something strong is over.
     """
 
     parts: MeanParts
     noise: SensorNoise
+    shift: StateShift | None
     scales: Mapping[str, LogScale]
     release: Release
 
@@ -186,20 +194,53 @@ class InnovationScores:
         scales = {
             name: LogScale.fit(np.concatenate([mean[name] for mean in means])) for name in RELEASED
         }
-        return cls(parts, SensorNoise.fit(outliers, steps.noise), scales, steps.release)
+        noise = SensorNoise.fit(outliers, steps.noise)
+        return cls(parts, noise, _fit_shift(runs, parts, steps.shift), scales, steps.release)
 
     def of(self, run: Run) -> dict[str, NDArray[np.float32]]:
         """Return (window,) scores along one gapless run by detector."""
         made = self.parts.of(run)
         noise = self.noise.score(run.outliers(self.parts.closed_form.size.precision))
+        shifts = self._shifts(run)
         for name in RELEASED:
             logs = self.scales[name].of(made[name])
-            heard = logs if name == CLOSED_FORM else np.maximum(logs, noise)
-            made[name] = np.exp(self.release.of(heard))
+            if name != CLOSED_FORM:
+                logs = np.maximum(logs, noise)
+            if name in shifts:
+                logs = np.maximum(logs, np.nan_to_num(shifts[name], nan=-np.inf))
+            made[name] = np.exp(self.release.of(logs))
         return {
             name: np.clip(part, _SMALLEST, _LARGEST).astype(np.float32)
             for name, part in made.items()
         }
+
+    def _shifts(self, run: Run) -> dict[str, FloatArray]:
+        """Return (window,) scores of a shift by detector, on the log scale, where one is sought."""
+        if self.shift is None:
+            return {}
+        parts, tied = self.parts, None
+        if parts.share_holding:
+            tied = parts.consistency.parts(parts.relations.residuals(run.samples)).max(axis=0)
+        of_twin, of_closed = _shift_ratios(run, parts, self.shift.steps.memory)
+        return {
+            ODISAR: self.shift.score(of_twin, of_closed, tied),
+            WITHOUT_TRANSFORMER: self.shift.score(None, of_closed, tied),
+        }
+
+
+def _fit_shift(
+    runs: Sequence[Run], parts: MeanParts, steps: ShiftSteps | None
+) -> StateShift | None:
+    if steps is None:
+        return None
+    ratios = [_shift_ratios(run, parts, steps.memory) for run in runs]
+    return StateShift.fit([twin for twin, _ in ratios], [closed for _, closed in ratios], steps)
+
+
+def _shift_ratios(run: Run, parts: MeanParts, memory: int) -> tuple[FloatArray, FloatArray]:
+    """Return (window,) ratios of the twin's innovations and of the closed form's."""
+    twin = run.shifts(run.innovations, parts.twin.size.precision, memory)
+    return twin, run.shifts(run.closed_form, parts.closed_form.size.precision, memory)
 
 
 def _geometric_mean(*weighed: tuple[FloatArray, float]) -> FloatArray:

@@ -16,7 +16,9 @@ from odisar.capability.innovations import (
 )
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
+from odisar.capability.shifts import ShiftSteps, StateShift
 from odisar.config.base import PositiveInt, Section
+from odisar.config.score import LONGEST_MEMORY
 
 _NUMBER_LIMIT = 1e30
 _Number = Annotated[float, Field(ge=-_NUMBER_LIMIT, le=_NUMBER_LIMIT)]
@@ -168,6 +170,38 @@ class NoiseValues(Section):
         )
 
 
+class ShiftStepsValues(Section):
+    """How far back a shift of one state is sought, and its margin."""
+
+    memory: Annotated[int, Field(ge=1, le=LONGEST_MEMORY)]
+    margin: Annotated[float, Field(ge=0, le=_NUMBER_LIMIT)]
+
+
+class ShiftValues(Section):
+    """The score of a shift of one state."""
+
+    steps: ShiftStepsValues
+    twin: ScaleValues
+    closed_form: ScaleValues
+
+    @classmethod
+    def of(cls, shift: StateShift) -> Self:
+        """Return the numbers of a fitted score."""
+        return cls(
+            steps=ShiftStepsValues(**vars(shift.steps)),
+            twin=ScaleValues(**vars(shift.twin)),
+            closed_form=ScaleValues(**vars(shift.closed_form)),
+        )
+
+    def build(self) -> StateShift:
+        """Return the score."""
+        return StateShift(
+            ShiftSteps(**self.steps.model_dump()),
+            LogScale(**self.twin.model_dump()),
+            LogScale(**self.closed_form.model_dump()),
+        )
+
+
 class ReleaseValues(Section):
     """How the score lets go of something strong that is over."""
 
@@ -176,7 +210,7 @@ class ReleaseValues(Section):
 
 
 class InnovationScoreValues(Section):
-    """All that the monitor's score is made of: its parts, their relations, noise and scales."""
+    """All that the monitor's score is made of: its parts, their relations, noise, shift and scales."""
 
     twin: InnovationValues
     closed_form: InnovationValues
@@ -185,6 +219,7 @@ class InnovationScoreValues(Section):
     share_holding: Annotated[float, Field(ge=0, le=1)]
     scatter: ScatterValues | None
     noise: NoiseValues
+    shift: ShiftValues | None
     scales: dict[str, ScaleValues]
     release: ReleaseValues
 
@@ -206,6 +241,7 @@ class InnovationScoreValues(Section):
             share_holding=parts.share_holding,
             scatter=None if parts.scatter is None else ScatterValues.of(parts.scatter),
             noise=NoiseValues.of(scores.noise),
+            shift=None if scores.shift is None else ShiftValues.of(scores.shift),
             scales={name: ScaleValues(**vars(s)) for name, s in scores.scales.items()},
             release=ReleaseValues(**vars(scores.release)),
         )
@@ -224,6 +260,7 @@ class InnovationScoreValues(Section):
         return InnovationScores(
             parts,
             self.noise.build(),
+            None if self.shift is None else self.shift.build(),
             {name: LogScale(**scale.model_dump()) for name, scale in self.scales.items()},
             Release(**self.release.model_dump()),
         )

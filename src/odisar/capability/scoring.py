@@ -25,6 +25,7 @@ from odisar.capability.scores import (
     reconstruction_error,
     state_reconstruction_errors,
 )
+from odisar.capability.shifts import ShiftFilter
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
 from odisar.twin.mc_dropout import draw_forecasts
@@ -81,6 +82,7 @@ class Scorer:
         self.twin = twin
         self.innovation_scores = innovation_scores
         self._outliers = OutlierFilter.of(twin)
+        self._shifts = ShiftFilter(self._outliers.response)
         self._batch = batch
         self._device = torch.device(device)
         self._network = twin.network.to(self._device).eval()
@@ -118,6 +120,7 @@ class Scorer:
             samples,
             scores.scores[RECONSTRUCTION][at].astype(np.float64),
             partial(self._outliers.squares, recording, positions, closed_form, samples),
+            partial(self._shifts.ratios, samples),
         )
 
     def _with_innovation_scores(

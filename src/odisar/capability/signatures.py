@@ -44,12 +44,14 @@ class Signatures:
         samples: NDArray[np.floating],
         windows: NDArray[np.int64],
         directions: FloatArray,
+        is_rare: NDArray[np.bool_],
     ) -> FloatArray:
         """Return (window, state) how much of what is seen each state explains, in std deviations.
 
         ``innovations`` (time, state feature) and ``samples`` (time, feature) are of one gapless
         run, ``windows`` which of its times are asked for, ascending, ``directions`` (time, state,
-        state feature) those of ``state_directions``. It is the root of twice the log likelihood
+        state feature) those of ``state_directions``, ``is_rare`` (time,) whether the monitor's
+        score is: it may remember what these innovations no longer show. It is the root of twice the log likelihood
         ratio of the state's best fault, a shift, a drift or noise, at the best of its possible
         onsets.
         """
@@ -57,7 +59,8 @@ class Signatures:
         # may have been adding up for longer; of what is so weak more samples tell no more.
         memory = max(self.score.mean.steps, self.score.size.steps)
         lead_in = memory + len(self.response.linear) - 1
-        starts = alarm_starts(self.score.parts(innovations).max(axis=0) >= 1, memory)
+        is_rare = is_rare | (self.score.parts(innovations).max(axis=0) >= 1)
+        starts = alarm_starts(is_rare, memory)
         first = np.maximum(np.maximum(starts[windows] - lead_in, windows - _LONGEST), 0)
         found = np.zeros((len(windows), directions.shape[1]))
         for piece in _pieces(windows):

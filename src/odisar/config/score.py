@@ -9,6 +9,9 @@ from odisar.config.base import NonNegativeFloat, PositiveInt, Section
 #: What is usual and rare on held-out recordings isn't known from fewer scores.
 FEWEST_KNOWN = 20
 
+#: Time and memory grow with that of shifts.
+LONGEST_MEMORY = 1000
+
 _Weight = Annotated[float, Field(ge=0, lt=1)]
 _Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -60,6 +63,17 @@ class NoiseConfig(Section):
         return self
 
 
+class ShiftConfig(Section):
+    """How far back a shift of one state is sought, and how rare it must be.
+
+    One may have set in ``memory_steps`` samples ago and have lasted as many; ``margin`` is taken
+    off, as that of noise is.
+    """
+
+    memory_steps: Annotated[int, Field(ge=1, le=LONGEST_MEMORY)]
+    margin: NonNegativeFloat
+
+
 class ReleaseConfig(Section):
     """How a score lets go of something strong that is over.
 
@@ -76,13 +90,15 @@ class ScoreConfig(Section):
     """How far back a case's score looks.
 
     On innovations, the twin's and its closed form's alike, on parity residuals (``consistency``),
-    on the scatter that adds up and on the noise of one sensor; and how it lets go (``release``).
+    on the scatter that adds up, on the noise of one sensor and on a shift of one state (null: none
+    is sought); and how it lets go (``release``).
     """
 
     innovation: StatisticsConfig
     consistency: StatisticsConfig
     scatter: ScatterConfig
     noise: NoiseConfig
+    shift: ShiftConfig | None
     release: ReleaseConfig
 
     @property

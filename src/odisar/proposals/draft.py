@@ -213,6 +213,8 @@ def _judging(draft: Draft) -> Iterator[str]:
     yield line(12, f"scatter: {scatter}", note="share: raise where disturbances last for minutes")
     noise = flow(lasting_steps=10, recent_steps=3, recent_share=0.5, margin=0.3)
     yield line(12, f"noise: {noise}", note="margin: 0 hears one noisy sensor soonest")
+    shift = flow(memory_steps=100, margin=0.5)
+    yield line(12, f"shift: {shift}", note="margin: 0 hears a sensor that reads wrong soonest")
     release = flow(steps=10, share=0.5)
     yield line(12, f"release: {release}", note="lets go of something strong that is over")
     yield line(

@@ -14,6 +14,7 @@ from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps
 from odisar.capability.release import Release
+from odisar.capability.shifts import ShiftSteps
 from odisar.capability.scoring import RecordingScores, Scorer
 from odisar.config.score import ScoreConfig, StatisticsConfig
 from odisar.recordings.schema import Recording
@@ -95,13 +96,14 @@ def fit_relations(data: MemberData, twin: TrainedTwin) -> Consistency:
 
 def score_steps(config: ScoreConfig) -> ScoreSteps:
     """Return how far back a case's score looks."""
-    noise = config.noise
+    noise, shift = config.noise, config.shift
     return ScoreSteps(
         innovation=_statistics(config.innovation),
         consistency=_statistics(config.consistency),
         scatter=config.scatter.steps,
         scatter_share=config.scatter.share,
         noise=NoiseSteps(noise.lasting_steps, noise.recent_steps, noise.recent_share, noise.margin),
+        shift=None if shift is None else ShiftSteps(shift.memory_steps, shift.margin),
         release=Release(config.release.steps, config.release.share),
     )
 

@@ -1,4 +1,4 @@
-"""The monitor's score: the mean of its parts, or the noise of one sensor, whichever is rarer."""
+"""The monitor's score: the mean of its parts, one sensor's noise or shift, whichever is rarer."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,6 +21,7 @@ from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import LogScale
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
+from odisar.capability.shifts import StateShift
 from odisar.recordings.schema import Recording
 from odisar.seeding import generator
 from small_innovations import STEPS as SMALL_STEPS
@@ -38,6 +39,14 @@ def scores() -> InnovationScores:
 
 def noise_of(scores: InnovationScores, run: Run) -> np.ndarray:
     return scores.noise.score(run.outliers(scores.parts.closed_form.size.precision))
+
+
+def shift_of(scores: InnovationScores, run: Run, name: str) -> np.ndarray:
+    parts, memory = scores.parts, scores.shift.steps.memory
+    closed = run.shifts(run.closed_form, parts.closed_form.size.precision, memory)
+    twin = run.shifts(run.innovations, parts.twin.size.precision, memory)
+    tied = parts.consistency.parts(parts.relations.residuals(run.samples)).max(axis=0)
+    return scores.shift.score(twin if name == ODISAR else None, closed, tied)
 
 
 def with_outliers(run: Run, square: float) -> Run:
@@ -64,16 +73,69 @@ def test_the_mean_is_the_weighed_geometric_one_of_three_parts(scores, share):
 
 
 @pytest.mark.parametrize("name", HEARING)
-def test_the_whole_is_the_larger_of_the_mean_and_noise_on_one_log_scale(scores, name):
+def test_the_whole_is_the_largest_of_mean_noise_and_shift_on_one_log_scale(scores, name):
     run = invented_run("fresh", 400)
     mean = scores.scales[name].of(scores.parts.of(run)[name])
-    noise = noise_of(scores, run)
+    parts = np.stack([mean, noise_of(scores, run), shift_of(scores, run, name)])
     found = scores.of(run)[name]
-    wanted = np.exp(scores.release.of(np.maximum(mean, noise)))
-    np.testing.assert_allclose(found, wanted, rtol=1e-5)
+    known = slice(scores.known_after_steps, None)
+    wanted = np.exp(scores.release.of(parts.max(axis=0)[known]))
+    np.testing.assert_allclose(found[known], wanted, rtol=1e-5)
     # Each of them counts at times.
-    assert {True, False} == set((noise > mean)[scores.known_after_steps :])
+    assert {0, 1, 2} == set(parts[:, known].argmax(axis=0))
     assert found.dtype == np.float32
+
+
+def test_a_shift_raises_the_whole_alone_and_none_is_heard_where_none_is_sought(scores):
+    run = invented_run("fresh", 300)
+    shifted = replace(run, shifts=lambda values, *_: np.full(len(values), 1e6))
+    calm, loud, deaf = scores.of(run), scores.of(shifted), replace(scores, shift=None).of(shifted)
+    known = slice(scores.known_after_steps, None)
+    for name in HEARING:
+        assert (loud[name][known] > calm[name][known]).mean() > 0.9
+        mean = scores.scales[name].of(scores.parts.of(run)[name])
+        wanted = scores.release.of(np.maximum(mean, noise_of(scores, run)))
+        np.testing.assert_allclose(deaf[name], np.exp(wanted), rtol=1e-5)
+    for name in (CLOSED_FORM, CONSISTENCY):
+        np.testing.assert_array_equal(loud[name], calm[name])
+    assert invented_scores(replace(STEPS, shift=None)).shift is None
+
+
+def test_without_a_relation_that_holds_consistency_holds_no_shift_back(scores):
+    run = replace(invented_run("fresh", 300), shifts=lambda values, *_: np.full(len(values), 1e9))
+    held = scores.of(run)[ODISAR]
+    free = replace(scores, parts=replace(scores.parts, share_holding=0.0)).of(run)[ODISAR]
+    known = slice(scores.known_after_steps, None)
+    assert (free[known] > 10 * held[known]).all()
+
+
+def test_before_a_shift_can_be_told_the_other_parts_count(scores):
+    run = invented_run("fresh", 300)
+    unknown = replace(run, shifts=lambda values, *_: np.full(len(values), np.nan))
+    np.testing.assert_array_equal(
+        scores.of(unknown)[ODISAR], replace(scores, shift=None).of(run)[ODISAR]
+    )
+
+
+def test_shifts_are_sought_by_the_precision_of_the_innovations_they_are_sought_in(scores):
+    asked, run = [], invented_run("fresh")
+
+    def shifts(innovations: np.ndarray, precision: np.ndarray, memory: int) -> np.ndarray:
+        asked.append((innovations, precision, memory))
+        return run.shifts(innovations, precision, memory)
+
+    scores.of(replace(run, shifts=shifts))
+    InnovationScores.fit([replace(run, shifts=shifts)], scores.parts.relations, STEPS)
+    for parts, pair in (
+        (scores.parts, asked[:2]),
+        (MeanParts.fit([run], scores.parts.relations, STEPS), asked[2:]),
+    ):
+        for (values, precision, memory), wanted, part in zip(
+            pair, (run.innovations, run.closed_form), (parts.twin, parts.closed_form), strict=True
+        ):
+            assert values is wanted
+            np.testing.assert_array_equal(precision, part.size.precision)
+            assert memory == STEPS.shift.memory
 
 
 @pytest.mark.parametrize("name", RELEASED)
@@ -83,6 +145,7 @@ def test_every_mean_on_the_log_scale_lets_go_of_something_strong_that_is_over(sc
     for struck in (innovations, closed_form):
         struck[200:220] *= 200
     run = replace(run, innovations=innovations, closed_form=closed_form)
+    scores = replace(scores, shift=None)
     mean = scores.scales[name].of(scores.parts.of(run)[name])
     found = np.log(scores.of(run)[name])
     np.testing.assert_allclose(found, scores.release.of(mean), atol=1e-5)
@@ -95,7 +158,7 @@ def test_noise_of_one_sensor_that_is_over_is_let_go_of_as_well(scores, name):
     run = invented_run("fresh", 300)
     squares = np.zeros(run.innovations.shape)
     squares[200:220] = 1e30
-    run = replace(run, outliers=lambda _: squares)
+    run, scores = replace(run, outliers=lambda _: squares), replace(scores, shift=None)
     mean = scores.scales[name].of(scores.parts.of(run)[name])
     found = np.log(scores.of(run)[name])
     wanted = scores.release.of(np.maximum(mean, noise_of(scores, run)))
@@ -104,6 +167,7 @@ def test_noise_of_one_sensor_that_is_over_is_let_go_of_as_well(scores, name):
 
 
 def test_noise_raises_the_whole_and_neither_the_closed_form_nor_consistency(scores):
+    scores = replace(scores, shift=None)
     calm = scores.of(with_outliers(invented_run("fresh"), 0.0))
     loud = scores.of(with_outliers(invented_run("fresh"), 1e4))
     known = slice(scores.known_after_steps, None)
@@ -158,6 +222,14 @@ def test_on_what_it_was_fitted_to_the_mean_is_usually_zero_and_rarely_one(scores
         np.testing.assert_allclose(np.quantile(found, [0.5, 0.99]), [0, 1], atol=0.02)
     noise = [run.outliers(scores.parts.closed_form.size.precision) for run in held_out]
     assert scores.noise == SensorNoise.fit(noise, STEPS.noise)
+    twin, closed = (
+        [run.shifts(getattr(run, name), part.size.precision, 9) for run in held_out]
+        for name, part in (
+            ("innovations", scores.parts.twin),
+            ("closed_form", scores.parts.closed_form),
+        )
+    )
+    assert scores.shift == StateShift.fit(twin, closed, STEPS.shift)
     assert scores.release == STEPS.release
 
 

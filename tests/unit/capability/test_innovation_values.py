@@ -32,6 +32,8 @@ def test_noise_scatter_and_the_scales_come_back_as_they_were(content):
     scores, back = invented_scores(), InnovationScoreValues.model_validate(content).build()
     assert back.noise == scores.noise
     assert back.noise.steps == STEPS.noise
+    assert back.shift == scores.shift
+    assert back.shift.steps == STEPS.shift
     assert (back.scales, back.release) == (scores.scales, scores.release)
     assert len({(scale.usual, scale.rare) for scale in back.scales.values()}) == len(RELEASED)
     assert back.parts.scatter.share == 0.15
@@ -41,13 +43,17 @@ def test_noise_scatter_and_the_scales_come_back_as_they_were(content):
         assert (found.steps, found.scale) == (7, wanted.scale)
 
 
-def test_without_scatter_the_mapping_says_null_and_must_say_so(content):
-    none = InnovationScoreValues.of(invented_scores(replace(STEPS, scatter_share=0.0)))
-    content = json.loads(none.model_dump_json())
-    assert content["scatter"] is None
-    assert InnovationScoreValues.model_validate(content).build().parts.scatter is None
-    del content["scatter"]
-    with pytest.raises(ValidationError, match="scatter"):
+@pytest.mark.parametrize(
+    ("key", "steps"),
+    [("scatter", replace(STEPS, scatter_share=0.0)), ("shift", replace(STEPS, shift=None))],
+)
+def test_without_scatter_or_shift_the_mapping_says_null_and_must_say_so(key, steps):
+    content = json.loads(InnovationScoreValues.of(invented_scores(steps)).model_dump_json())
+    assert content[key] is None
+    back = InnovationScoreValues.model_validate(content).build()
+    assert (back.parts.scatter if key == "scatter" else back.shift) is None
+    del content[key]
+    with pytest.raises(ValidationError, match=key):
         InnovationScoreValues.model_validate(content)
 
 
@@ -158,6 +164,11 @@ def test_relations_that_can_be_none_are_refused(content, key, value, complaint):
         (("scales", "closed-form"), {"usual": 0.0}, "scales.closed-form.rare"),
         (("scales", "other"), {"usual": 0.0, "rare": 1.0}, "expected odisar, without-transformer"),
         (("scales",), {"odisar": {"usual": 0.0, "rare": 1.0}}, "without-transformer, closed-form"),
+        (("shift", "steps", "memory"), 0, "greater than or equal to 1"),
+        (("shift", "steps", "memory"), 1001, "less than or equal to 1000"),
+        (("shift", "steps", "margin"), -0.1, "greater than or equal to 0"),
+        (("shift", "twin"), {"usual": 1.0, "rare": 1.0}, "must be above usual=1.0"),
+        (("shift", "closed_form"), None, "shift.closed_form"),
         (("release", "steps"), 0, "greater than 0"),
         (("release", "share"), 1.1, "less than or equal to 1"),
         (("release", "share"), -0.1, "greater than or equal to 0"),
@@ -172,7 +183,7 @@ def test_noise_scatter_and_scales_that_can_be_none_are_refused(content, place, v
         InnovationScoreValues.model_validate(content)
 
 
-@pytest.mark.parametrize("key", ["noise", "scales", "release", "share_holding", "relations"])
+@pytest.mark.parametrize("key", ["noise", "shift", "scales", "release", "share_holding", "relations"])
 def test_whatever_of_the_whole_is_missing_is_named(content, key):
     del content[key]
     with pytest.raises(ValidationError, match=key):

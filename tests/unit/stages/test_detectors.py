@@ -12,6 +12,7 @@ from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
 from odisar.capability.scoring import DETECTORS, RecordingScores, Scorer
+from odisar.capability.shifts import ShiftSteps, StateShift
 from odisar.config.cases import RangeRule
 from odisar.config.loader import load_config
 from odisar.config.score import ScoreConfig
@@ -64,6 +65,7 @@ def other_windows() -> ScoreConfig:
             },
             "scatter": {"steps": 6, "share": 0.1},
             "noise": {"lasting_steps": 9, "recent_steps": 8, "recent_share": 0.6, "margin": 0.7},
+            "shift": {"memory_steps": 11, "margin": 0.9},
             "release": {"steps": 12, "share": 0.8},
         }
     )
@@ -174,6 +176,7 @@ def test_the_steps_of_a_score_are_those_that_its_case_asks_for():
         scatter=6,
         scatter_share=0.1,
         noise=NoiseSteps(lasting=9, recent=8, recent_share=0.6, margin=0.7),
+        shift=ShiftSteps(memory=11, margin=0.9),
         release=Release(steps=12, share=0.8),
     )
 
@@ -189,6 +192,28 @@ def test_noise_is_fitted_on_validation_recordings_by_the_closed_forms_precision(
     ]
     assert fitted.noise == SensorNoise.fit(squares, NoiseSteps(9, 8, 0.6, 0.7))
     assert fitted.release == Release(12, 0.8)
+
+
+def test_shifts_are_fitted_on_validation_recordings_or_not_sought(data, trained_twin):
+    windows = other_windows()
+    case = data.case.model_copy(update={"score": windows})
+    scorer = Scorer(trained_twin, 64, "cpu")
+    fitted = fit_innovation_scores(scorer, replace(data, case=case))
+    runs = [
+        run
+        for item in data.splits["validation"]
+        for run in scorer.runs(item, scorer.score(item, short_lead_steps=3))
+    ]
+    twin, closed = (
+        [run.shifts(getattr(run, name), part.size.precision, 11) for run in runs]
+        for name, part in (
+            ("innovations", fitted.parts.twin),
+            ("closed_form", fitted.parts.closed_form),
+        )
+    )
+    assert fitted.shift == StateShift.fit(twin, closed, ShiftSteps(11, 0.9))
+    case = data.case.model_copy(update={"score": windows.model_copy(update={"shift": None})})
+    assert fit_innovation_scores(scorer, replace(data, case=case)).shift is None
 
 
 def test_relations_are_fitted_on_training_recordings(data, trained_twin):
