@@ -171,7 +171,7 @@ def analytic_scores() -> InnovationScores:
         WITHOUT_TRANSFORMER: LogScale(-0.4, 1.3),
         CLOSED_FORM: LogScale(-0.2, 1.1),
     }
-    shift = StateShift(ShiftSteps(memory=9, margin=0.3), LogScale(0.0, 2.3), LogScale(0.1, 2.2))
+    shift = StateShift(ShiftSteps(memory=9, margin=0.2), LogScale(0.0, 1.3), LogScale(0.1, 1.2))
     return InnovationScores(parts, noise, shift, scales, Release(steps=6, share=0.5))
 
 

@@ -201,7 +201,7 @@ class InnovationScores:
         """Return (window,) scores along one gapless run by detector."""
         made = self.parts.of(run)
         noise = self.noise.score(run.outliers(self.parts.closed_form.size.precision))
-        shifts = self._shifts(run)
+        shifts = self.shifts(run)
         for name in RELEASED:
             logs = self.scales[name].of(made[name])
             if name != CLOSED_FORM:
@@ -214,7 +214,7 @@ class InnovationScores:
             for name, part in made.items()
         }
 
-    def _shifts(self, run: Run) -> dict[str, FloatArray]:
+    def shifts(self, run: Run) -> dict[str, FloatArray]:
         """Return (window,) scores of a shift by detector, on the log scale, where one is sought."""
         if self.shift is None:
             return {}

@@ -210,7 +210,7 @@ class ReleaseValues(Section):
 
 
 class InnovationScoreValues(Section):
-    """All that the monitor's score is made of: its parts, their relations, noise, shift and scales."""
+    """All that the monitor's score is made of: parts, relations, noise, shift and scales."""
 
     twin: InnovationValues
     closed_form: InnovationValues

@@ -123,7 +123,7 @@ def _scale(ratios: FloatArray) -> LogScale:
 
 def _drawn_in(innovations: FloatArray, precision: FloatArray) -> FloatArray:
     furthest = np.abs(innovations * np.sqrt(np.diag(precision))).max(axis=1, initial=0.0)
-    return innovations * (_FURTHEST / np.maximum(furthest, _FURTHEST))[:, None]
+    return np.asarray(innovations * (_FURTHEST / np.maximum(furthest, _FURTHEST))[:, None])
 
 
 def _ratios(
@@ -159,7 +159,8 @@ def _ended(along: "_Since", size: "_Since", both: "_Since", memory: int) -> Floa
             value = explained**2 / np.maximum(own, _SMALLEST)
             np.maximum(best[lasted:], value, out=best[lasted:])
         if age == oldest:
-            best = pd.DataFrame(best).rolling(max(1, memory - oldest), min_periods=1).max()
+            later = max(1, memory - oldest)
+            best = pd.DataFrame(best).rolling(later, min_periods=1).max().to_numpy()
         np.maximum(ended[age:], best, out=ended[age:])
     return ended
 

@@ -51,9 +51,9 @@ class Signatures:
         ``innovations`` (time, state feature) and ``samples`` (time, feature) are of one gapless
         run, ``windows`` which of its times are asked for, ascending, ``directions`` (time, state,
         state feature) those of ``state_directions``, ``is_rare`` (time,) whether the monitor's
-        score is: it may remember what these innovations no longer show. It is the root of twice the log likelihood
-        ratio of the state's best fault, a shift, a drift or noise, at the best of its possible
-        onsets.
+        score is: it may remember what these innovations no longer show. What is returned is the
+        root of twice the log likelihood ratio of the state's best fault, a shift, a drift or noise,
+        at the best of its possible onsets.
         """
         # What is rare now may have set in when the oldest sample of these statistics came. Scatter
         # may have been adding up for longer; of what is so weak more samples tell no more.

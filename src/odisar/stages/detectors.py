@@ -14,8 +14,8 @@ from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps
 from odisar.capability.outliers import NoiseSteps
 from odisar.capability.release import Release
-from odisar.capability.shifts import ShiftSteps
 from odisar.capability.scoring import RecordingScores, Scorer
+from odisar.capability.shifts import ShiftSteps
 from odisar.config.score import ScoreConfig, StatisticsConfig
 from odisar.recordings.schema import Recording
 from odisar.seeding import derive_seed

@@ -17,15 +17,16 @@ WEIGHTS, SIZES, LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
 RECENT, _TIED_SIZES = (1, 3, 5), (3, 10)
 #: The scatter that adds up: over how many innovations, and its share of the mean.
 SCATTER = ((20, 0.2), (60, 0.3), (60, 0.45))
-#: How much further out than the rest the noise of one sensor must be, on the common log scale.
-MARGINS = (0.0, 0.3, 0.75)
+#: How much further out than the rest one sensor's noise must be, and its shift, on the common log
+#: scale. Shifts are found with more to spare.
+MARGINS = ((0.0, 0.25), (0.3, 0.5), (0.75, 1.0))
 #: Letting go, beside not doing so.
 RELEASES = (Release(10, 0.5), Release(60, 0.5), Release(60, 1.0))
 
 #: Before the name of a statistic of the closed form's innovations, of parity residuals.
 CLOSED, PARITY = "closed form's ", "parity residuals' "
-#: The noise of one sensor, as the monitor's score has it.
-NOISE = "noise of one sensor"
+#: The noise of one sensor, and its shift, as the monitor's score has them.
+NOISE, SHIFT = "noise of one sensor", "its shift"
 
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
@@ -35,22 +36,22 @@ Statistics = Mapping[str, FloatArray]
 class Candidate:
     """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those.
 
-    One that doesn't use the twin is there to be compared with, not to be chosen. With a
-    ``noise_margin`` it is that or the noise of one sensor less the margin, whichever is rarer, and
-    with a ``release`` it lets go of what is over.
+    One that doesn't use the twin is there to be compared with, not to be chosen. With ``margins``
+    it is that, or one sensor's noise or shift less its margin, whichever is rarest, and with a
+    ``release`` it lets go of what is over.
     """
 
     name: str
     parts: int
     of: Callable[[Statistics], FloatArray]
     uses_twin: bool = True
-    noise_margin: float | None = None
+    margins: tuple[float, float] | None = None
     release: Release | None = None
 
     @property
     def can_be_chosen(self) -> bool:
         """Whether the rule may choose it (see ``development``)."""
-        return self.uses_twin and self.noise_margin is not None
+        return self.uses_twin and self.margins is not None
 
 
 def candidates() -> list[Candidate]:
@@ -94,8 +95,8 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     """Return the largest of three, of a mean that single innovations can't rule.
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
-    say as well; the last also with the scatter that adds up, with the noise of one sensor beside,
-    and letting go. In between the same without the twin.
+    say as well; the last also with the scatter that adds up, with one sensor's noise and shift
+    beside, and letting go. In between the same without the twin.
     """
     name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
     name += f"; recent mean over {last} (.7, .3)"
@@ -126,9 +127,10 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     # Those with every part, consistency with the last of its sizes.
     full = [one for one in made if one.name.startswith(whole)]
     for one in full:
-        for margin in MARGINS:
-            name = f"{one.name}; or {NOISE}, {margin:g}"
-            heard = replace(one, name=name, parts=one.parts + 2, noise_margin=margin)
+        for margins in MARGINS:
+            noise, shift = margins
+            name = f"{one.name}; or {NOISE}, {noise:g}, or {SHIFT}, {shift:g}"
+            heard = replace(one, name=name, parts=one.parts + 4, margins=margins)
             made.append(heard)
             for release in RELEASES:
                 name = f"{heard.name}; release over {release.steps} ({release.share:g})"

@@ -2,7 +2,7 @@
 
 The rule: of the candidates that can be chosen, a case's is the one with the highest mean over cells
 (kind and strength) of (AUROC + TNR@TPR95) / 2 by protocol P2. No test recording has a part in it.
-Those can be that use the twin and have the noise of one sensor beside: the ferry's development
+Those can be that use the twin and have one sensor's noise and shift beside: the ferry's development
 recordings hold weather alone, and by them a detector had better not listen to its sensors.
 """
 
@@ -14,6 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace, write_table
+from odisar.capability.combined import ODISAR, InnovationScores
 from odisar.capability.innovations import (
     FloatArray,
     InnovationLimit,
@@ -24,7 +25,6 @@ from odisar.capability.innovations import (
     moving_mean,
     squared_distance,
 )
-from odisar.capability.outliers import SensorNoise
 from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
 from odisar.config.loader import ConfigView
 from odisar.errors import OdisarError
@@ -40,6 +40,7 @@ from odisar.study.candidates import (
     NOISE,
     PARITY,
     RECENT,
+    SHIFT,
     SIZES,
     WEIGHTS,
     WINDOWS,
@@ -135,18 +136,20 @@ class _Seen:
 def _scale(one: Candidate, usual: Sequence[Statistics]) -> LogScale | None:
     """Return what puts a candidate on the scale of noise: held-out recordings are as rare there.
 
-    One without noise beside needs none.
+    One without noise and shift beside needs none.
     """
-    if one.noise_margin is None:
+    if one.margins is None:
         return None
     return LogScale.fit(np.exp(np.concatenate([one.of(made) for made in usual])))
 
 
 def _said(one: Candidate, scale: LogScale | None, seen: _Seen) -> FloatArray:
     mean = one.of(seen.statistics)
-    if scale is None or one.noise_margin is None:
+    if scale is None or one.margins is None:
         return mean
-    heard = np.maximum(scale.of(np.exp(mean)), seen.statistics[NOISE] - one.noise_margin)
+    noise, shift = seen.statistics[NOISE] - one.margins[0], seen.statistics[SHIFT] - one.margins[1]
+    heard = np.maximum(scale.of(np.exp(mean)), noise)
+    heard = np.maximum(heard, np.nan_to_num(shift, nan=-np.inf))
     if one.release is None:
         return heard
     return np.concatenate([one.release.of(heard[start:stop]) for start, stop in seen.runs])
@@ -197,23 +200,32 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
         )
     raw[RECONSTRUCTION] = lambda _, s: s.scores[RECONSTRUCTION].astype(np.float64)
     made = {name: _scaled(make, held_out) for name, make in raw.items()}
-    made[NOISE] = _noise(data, scorer, held_out)
-    return made
+    return made | _beside(data, scorer, held_out)
 
 
-def _noise(data: MemberData, scorer: Scorer, held_out: HeldOut) -> Maker:
-    """Return what makes the noise of one sensor, without a margin."""
-    closed = [s.closed_form_innovations for _, s in held_out]
-    precision = fit_precision(np.concatenate(closed))
+def _beside(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[str, Maker]:
+    """Return what makes the noise of one sensor, and its shift, without a margin."""
     runs = [run for item, scores in held_out for run in scorer.runs(item, scores)]
-    steps = replace(score_steps(data.case.score).noise, margin=0.0)
-    noise = SensorNoise.fit([run.outliers(precision) for run in runs], steps)
+    asked = score_steps(data.case.score)
+    steps = replace(
+        asked,
+        noise=replace(asked.noise, margin=0.0),
+        shift=None if asked.shift is None else replace(asked.shift, margin=0.0),
+    )
+    fitted = InnovationScores.fit(runs, fit_relations(data, scorer.twin), steps)
+    precision = fitted.parts.closed_form.size.precision
 
-    def make(item: Recording, scores: RecordingScores) -> FloatArray:
-        found = [noise.score(run.outliers(precision)) for run in scorer.runs(item, scores)]
+    def noise(item: Recording, scores: RecordingScores) -> FloatArray:
+        found = [fitted.noise.score(run.outliers(precision)) for run in scorer.runs(item, scores)]
         return np.concatenate(found)
 
-    return make
+    def shift(item: Recording, scores: RecordingScores) -> FloatArray:
+        found = [fitted.shifts(run) for run in scorer.runs(item, scores)]
+        unknown = [np.full(stop - start, np.nan) for start, stop in scores.runs]
+        # Where none is sought, none is heard.
+        return np.concatenate([f.get(ODISAR, none) for f, none in zip(found, unknown, strict=True)])
+
+    return {NOISE: noise, SHIFT: shift}
 
 
 def _limited_statistics(

@@ -21,7 +21,7 @@ def straight(*ages: list[list[float]]) -> StepResponse:
     return StepResponse(np.array(ages), np.zeros((2, 2, 2)), np.zeros((2, 2)), (0, 1))
 
 
-def blamed(signatures, innovations, samples, windows, directions, is_rare=False):
+def blamed(signatures, innovations, samples, windows, directions, *, is_rare=False):
     """Return the blame where the monitor's score is rare throughout, or nowhere."""
     rare = np.broadcast_to(is_rare, len(innovations))
     return signatures.blame(innovations, samples, windows, directions, rare)
@@ -91,7 +91,7 @@ def test_the_onset_is_remembered_while_the_score_is_rare_though_these_innovation
     is_rare = np.zeros(90, dtype=bool)
     is_rare[20:60] = True
     windows = np.array([59, 80])
-    held = blamed(signatures, innovations, samples, windows, directions, is_rare)
+    held = blamed(signatures, innovations, samples, windows, directions, is_rare=is_rare)
     forgotten = blamed(signatures, innovations, samples, windows, directions)
     assert held[0, 1] > 4
     assert forgotten[0].max() < 1

@@ -183,7 +183,7 @@ def test_noise_scatter_and_scales_that_can_be_none_are_refused(content, place, v
         InnovationScoreValues.model_validate(content)
 
 
-@pytest.mark.parametrize("key", ["noise", "shift", "scales", "release", "share_holding", "relations"])
+@pytest.mark.parametrize("key", sorted(InnovationScoreValues.model_fields))
 def test_whatever_of_the_whole_is_missing_is_named(content, key):
     del content[key]
     with pytest.raises(ValidationError, match=key):

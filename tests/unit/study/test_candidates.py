@@ -10,7 +10,7 @@ from odisar.capability.scoring import Scorer
 from odisar.config.loader import load_config
 from odisar.stages.detectors import score_steps
 from odisar.stages.members import MemberData
-from odisar.study.candidates import MARGINS, NOISE, RELEASES, candidates
+from odisar.study.candidates import MARGINS, NOISE, RELEASES, SHIFT, candidates
 from odisar.study.development import fit_statistics, ranked
 from small_bundle import small_case
 from small_system import make_recording
@@ -21,6 +21,7 @@ WHOLE = (
     "largest of limited mean over 20, size of one state over 3, reconstruction; "
     "recent mean over 5 (.7, .3); mean with closed form and consistency (size over 10)"
 )
+QUIETEST = "; or noise of one sensor, 0, or its shift, 0.25"
 WITH_SCATTER = [11.605 / 3 + 0.3375, 8.36 / 3 + 0.44 + 0.225, 9.13 / 3 + 1.1]
 
 
@@ -58,24 +59,24 @@ def test_what_does_not_use_the_twin_is_compared_and_not_ranked():
         assert one.name.startswith(("no twin", "closed form's", "parity residuals'"))
 
 
-def test_only_what_uses_the_twin_and_has_noise_beside_can_be_chosen():
+def test_only_what_uses_the_twin_and_has_noise_and_shift_beside_can_be_chosen():
     for one in candidates():
         beside = "; or noise of one sensor, " in one.name
-        assert one.can_be_chosen == beside == (one.noise_margin is not None)
+        assert one.can_be_chosen == beside == (one.margins is not None)
         assert one.uses_twin or not beside
         if beside:
             said = one.name.partition("; or noise of one sensor, ")[2].partition(";")[0]
-            assert float(said) == one.noise_margin
-    margins = [one.noise_margin for one in candidates() if one.can_be_chosen]
+            assert tuple(float(part) for part in said.split(", or its shift, ")) == one.margins
+    margins = [one.margins for one in candidates() if one.can_be_chosen]
     assert set(margins) == set(MARGINS)
 
 
-def test_what_has_noise_beside_stands_in_the_table_without_it_too():
+def test_what_has_them_beside_stands_in_the_table_without_them_too():
     every = {one.name: one for one in candidates()}
     for one in every.values():
         if one.can_be_chosen:
             alone = every[one.name.partition("; or noise")[0]]
-            assert (alone.parts, alone.can_be_chosen) == (one.parts - 2, False)
+            assert (alone.parts, alone.can_be_chosen) == (one.parts - 4, False)
             np.testing.assert_array_equal(alone.of(invented()), one.of(invented()))
 
 
@@ -88,14 +89,14 @@ def test_each_of_those_is_offered_with_every_way_of_letting_go_and_without():
             name = f"{one.name}; release over {release.steps} ({release.share:g})"
             assert chosen[name].release == release
             assert (chosen[name].parts, chosen[name].of) == (one.parts, one.of)
-            assert chosen[name].noise_margin == one.noise_margin
+            assert chosen[name].margins == one.margins
 
 
-def test_shipped_cases_let_go_and_hear_noise_in_ways_that_are_offered(request):
+def test_shipped_cases_let_go_and_hear_sensors_in_ways_that_are_offered(request):
     for case in load_config(request.config.rootpath).cases.values():
         steps = score_steps(case.score)
         assert steps.release in RELEASES
-        assert steps.noise.margin in MARGINS
+        assert (steps.noise.margin, steps.shift.margin) in MARGINS
 
 
 @pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])
@@ -168,9 +169,13 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
             12,
             [16.88 / 3 + 0.15, 12.16 / 3 + 0.64 + 0.1, 13.28 / 3 + 1.6],
         ),
-        # Noise is held against the mean where both are on one scale (see test_development).
-        (f"{WHOLE}; or noise of one sensor, 0.3", 12, [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0]),
-        (f"{WHOLE}; scatter over 60 (0.45); or noise of one sensor, 0", 14, WITH_SCATTER),
+        # Both are held against the mean where all are on one scale (see test_development).
+        (
+            f"{WHOLE}; or noise of one sensor, 0.3, or its shift, 0.5",
+            14,
+            [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0],
+        ),
+        (f"{WHOLE}; scatter over 60 (0.45){QUIETEST}", 16, WITH_SCATTER),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -220,7 +225,7 @@ def test_every_statistic_is_made_and_none_knows_what_comes_later(relative_twin):
 
     held_out = [score(make_recording(f"held-out-{i}", 200)) for i in range(2)]
     makers = fit_statistics(data, scorer, held_out)
-    assert set(makers) == {NOISE} | {one.name for one in candidates() if one.parts == 1}
+    assert set(makers) == {NOISE, SHIFT} | {one.name for one in candidates() if one.parts == 1}
     whole = make_recording("test", 160)
     ended = replace(whole, time_s=whole.time_s[:120], values=whole.values[:120], segments=())
     for name, make in makers.items():

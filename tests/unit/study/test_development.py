@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from odisar.artifacts import Workspace
+from odisar.capability.combined import ODISAR
 from odisar.capability.innovations import LogScale
 from odisar.capability.scoring import Scorer
 from odisar.errors import OdisarError
@@ -16,7 +17,7 @@ from odisar.recordings.schema import Recording
 from odisar.stages.detectors import fit_innovation_scores
 from odisar.stages.members import MemberData
 from odisar.study import development
-from odisar.study.candidates import NOISE, candidates
+from odisar.study.candidates import NOISE, SHIFT, candidates
 from odisar.study.development import fit_statistics
 from small_bundle import small_case
 from small_system import SPEC, make_recording
@@ -104,6 +105,30 @@ def test_noise_is_the_monitors_own_without_its_margin(data, scorer, makers):
     assert np.isfinite(found[fitted.noise.known_after_steps :]).all()
 
 
+def test_a_shift_is_the_monitors_own_without_its_margin(data, scorer, makers):
+    fitted = fit_innovation_scores(scorer, data)
+    assert fitted.shift.steps.margin > 0
+    item = make_recording("fresh", 120)
+    scores = scorer.score(item, short_lead_steps=3)
+    (run,) = scorer.runs(item, scores)
+    wanted = fitted.shifts(run)[ODISAR] + fitted.shift.steps.margin
+    np.testing.assert_allclose(makers[SHIFT](item, scores), wanted)
+    assert np.isfinite(wanted[fitted.known_after_steps :]).all()
+
+
+def test_where_no_shift_is_sought_none_is_heard(data, scorer):
+    case = data.case.model_copy(
+        update={"score": data.case.score.model_copy(update={"shift": None})}
+    )
+    deaf = replace(data, case=case)
+    held_out = [(i, scorer.score(i, short_lead_steps=3)) for i in data.splits["validation"]]
+    item = make_recording("fresh", 120)
+    scores = scorer.score(item, short_lead_steps=3)
+    found = fit_statistics(deaf, scorer, held_out)[SHIFT](item, scores)
+    assert np.isnan(found).all()
+    assert len(found) == len(scores.positions)
+
+
 def test_noise_begins_anew_after_a_gap(scorer, makers):
     item = replace(make_recording("gap", 160), segments=((0, 80), (80, 160)))
     scores = scorer.score(item, short_lead_steps=3)
@@ -127,7 +152,9 @@ def test_only_candidates_with_noise_are_ranked(table):
     assert pd.isna(ranks[SINGLE])
 
 
-def test_noise_less_its_margin_counts_where_it_is_rarer_than_the_mean(table, data, scorer, makers):
+def test_noise_and_shift_less_their_margins_count_where_they_are_rarer_than_the_mean(
+    table, data, scorer, makers
+):
     held_out = data.splits["validation"]
 
     def made(item):
@@ -140,15 +167,17 @@ def test_noise_less_its_margin_counts_where_it_is_rarer_than_the_mean(table, dat
     times = wind.time_s[scores.positions]
     labels = (times >= wind.intervals[0].start_s) & (times < wind.intervals[0].end_s)
     judged = table[table.kind == "wind"].set_index("candidate")
-    counted = let_go = 0
+    counted = moved = let_go = 0
     for one in chosen():
         mean = one.of(statistics)
-        if one.noise_margin is not None:
+        if one.margins is not None:
             scale = LogScale.fit(np.exp(np.concatenate([one.of(item) for item in usual])))
-            noise = statistics[NOISE] - one.noise_margin
+            noise, shift = statistics[NOISE] - one.margins[0], statistics[SHIFT] - one.margins[1]
             mean = (mean - scale.usual) / (scale.rare - scale.usual)
             counted += np.count_nonzero(noise > mean)
             mean = np.maximum(mean, noise)
+            moved += np.count_nonzero(shift > mean)
+            mean = np.maximum(mean, np.nan_to_num(shift, nan=-np.inf))
             if one.release is not None:
                 runs = [one.release.of(mean[start:stop]) for start, stop in scores.runs]
                 kept, mean = mean, np.concatenate(runs)
@@ -158,6 +187,7 @@ def test_noise_less_its_margin_counts_where_it_is_rarer_than_the_mean(table, dat
         wanted = tnr_at_tpr95(mean[known], labels[known])
         assert judged.tnr_at_tpr95[one.name] == pytest.approx(wanted)
     assert counted > 0
+    assert moved > 0
     assert let_go > 0
 
 
