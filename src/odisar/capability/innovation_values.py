@@ -1,111 +1,35 @@
 """Fitted innovation scores as plain numbers: what thresholds and bundles hold of them."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from odisar.capability.combined import RELEASED, InnovationScores, MeanParts, Scatter
 from odisar.capability.consistency import Consistency
-from odisar.capability.innovations import (
-    InnovationLimit,
-    InnovationScore,
-    InnovationSize,
-    LogScale,
-    MeanInnovation,
-)
+from odisar.capability.innovations import InnovationSize, LogScale
 from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
 from odisar.capability.shifts import ShiftSteps, StateShift
+from odisar.capability.statistic_values import (
+    NUMBER_LIMIT,
+    Covariant,
+    InnovationValues,
+    Number,
+    ScaleValues,
+    StatisticValues,
+    statistic_arguments,
+    statistic_values,
+)
 from odisar.config.base import PositiveInt, Section
 from odisar.config.score import LONGEST_MEMORY
-
-_NUMBER_LIMIT = 1e30
-_Number = Annotated[float, Field(ge=-_NUMBER_LIMIT, le=_NUMBER_LIMIT)]
-
-
-class ScaleValues(Section):
-    """The log scale of a statistic."""
-
-    usual: _Number
-    rare: _Number
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.rare <= self.usual:
-            raise ValueError(f"rare={self.rare} must be above usual={self.usual}")
-        return self
-
-
-class _Covariant(Section):
-    """Anything with an inverse covariance."""
-
-    precision: list[list[_Number]]
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if any(len(row) != len(self.precision) for row in self.precision):
-            raise ValueError(f"precision: expected {len(self.precision)} numbers in each row")
-        return self
-
-
-class LimitValues(_Covariant):
-    """How far out single innovations may count."""
-
-    distance: Annotated[float, Field(gt=0, le=_NUMBER_LIMIT)]
-
-
-class StatisticValues(_Covariant):
-    """One statistic of innovations: its window, the inverse covariance, its log scale."""
-
-    steps: PositiveInt
-    scale: ScaleValues
-
-
-class MeanValues(StatisticValues):
-    """T2 of a mean, of innovations that are cut back to a limit or not."""
-
-    limit: LimitValues | None
-
-
-class InnovationValues(Section):
-    """One innovation score."""
-
-    mean: MeanValues
-    size: StatisticValues
-    recent: MeanValues
-    recent_share: Annotated[float, Field(ge=0, lt=1)]
-    reconstruction: ScaleValues | None
-
-    @classmethod
-    def of(cls, score: InnovationScore) -> Self:
-        """Return the numbers of a fitted score."""
-        rebuilt = score.reconstruction
-        return cls(
-            mean=_mean_values(score.mean),
-            size=StatisticValues(**_values(score.size)),
-            recent=_mean_values(score.recent),
-            recent_share=score.recent_share,
-            reconstruction=None if rebuilt is None else ScaleValues(**vars(rebuilt)),
-        )
-
-    def build(self) -> InnovationScore:
-        """Return the score."""
-        rebuilt = self.reconstruction
-        return InnovationScore(
-            _mean(self.mean),
-            InnovationSize(**_arguments(self.size)),
-            _mean(self.recent),
-            self.recent_share,
-            None if rebuilt is None else LogScale(**rebuilt.model_dump()),
-        )
 
 
 class RelationValues(Section):
     """Relations between the features of a sample: the states' positions, a row of weights each."""
 
     states: list[Annotated[int, Field(ge=0)]]
-    weights: list[list[_Number]]
+    weights: list[list[Number]]
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -127,12 +51,14 @@ class ScatterValues(Section):
     def of(cls, scatter: Scatter) -> Self:
         """Return the numbers of a fitted score."""
         sizes = (scatter.twin, scatter.closed_form)
-        twin, closed = (StatisticValues(**_values(size)) for size in sizes)
+        twin, closed = (StatisticValues(**statistic_values(size)) for size in sizes)
         return cls(twin=twin, closed_form=closed, share=scatter.share)
 
     def build(self) -> Scatter:
         """Return the score."""
-        twin, closed = (InnovationSize(**_arguments(v)) for v in (self.twin, self.closed_form))
+        twin, closed = (
+            InnovationSize(**statistic_arguments(v)) for v in (self.twin, self.closed_form)
+        )
         return Scatter(twin, closed, self.share)
 
 
@@ -142,7 +68,7 @@ class NoiseStepsValues(Section):
     lasting: PositiveInt
     recent: PositiveInt
     recent_share: Annotated[float, Field(ge=0, lt=1)]
-    margin: Annotated[float, Field(ge=0, le=_NUMBER_LIMIT)]
+    margin: Annotated[float, Field(ge=0, le=NUMBER_LIMIT)]
 
 
 class NoiseValues(Section):
@@ -174,7 +100,7 @@ class ShiftStepsValues(Section):
     """How far back a shift of one state is sought, and its margin."""
 
     memory: Annotated[int, Field(ge=1, le=LONGEST_MEMORY)]
-    margin: Annotated[float, Field(ge=0, le=_NUMBER_LIMIT)]
+    margin: Annotated[float, Field(ge=0, le=NUMBER_LIMIT)]
 
 
 class ShiftValues(Section):
@@ -268,45 +194,10 @@ class InnovationScoreValues(Section):
     @property
     def states(self) -> set[int]:
         """How many state features the covariances are of; more than one number fits no twin."""
-        parts: list[_Covariant] = []
+        parts: list[Covariant] = []
         for score in (self.twin, self.closed_form, self.consistency):
             parts += [score.mean, score.size, score.recent]
             parts += [mean.limit for mean in (score.mean, score.recent) if mean.limit is not None]
         if self.scatter is not None:
             parts += [self.scatter.twin, self.scatter.closed_form]
         return {len(part.precision) for part in parts}
-
-
-def _mean_values(part: MeanInnovation) -> MeanValues:
-    limit = part.limit
-    given = (
-        None
-        if limit is None
-        else {
-            "precision": limit.precision.tolist(),
-            "distance": limit.distance,
-        }
-    )
-    return MeanValues.model_validate({**_values(part), "limit": given})
-
-
-def _values(part: MeanInnovation | InnovationSize) -> dict[str, Any]:
-    return {
-        "steps": part.steps,
-        "precision": part.precision.tolist(),
-        "scale": ScaleValues(**vars(part.scale)),
-    }
-
-
-def _mean(values: MeanValues) -> MeanInnovation:
-    limit = values.limit
-    built = None if limit is None else InnovationLimit(np.array(limit.precision), limit.distance)
-    return MeanInnovation(**_arguments(values), limit=built)
-
-
-def _arguments(values: StatisticValues) -> dict[str, Any]:
-    return {
-        "steps": values.steps,
-        "precision": np.array(values.precision),
-        "scale": LogScale(**values.scale.model_dump()),
-    }

@@ -146,7 +146,8 @@ def _reading(results: Results) -> list[str]:
         (
             "ODiSAR is a mean: of the twin's innovations, of its closed form's, of the consistency "
             "of one sample and, where a case gives it a share, of scatter that adds up over many "
-            "samples. Where the noise of one sensor is rarer than this mean, it counts instead. "
+            "samples. Where the noise of one sensor, or its shift, is rarer than this mean, it "
+            "counts instead. "
             "Of what a score has fallen below a strong peak of its own a share is taken off as "
             "well, as windows remember what is over. "
             "The closed form (with its scatter) and consistency stand beside it alone; all but "
