@@ -1,4 +1,4 @@
-"""The monitor's score: what innovations, parity residuals and noise of one sensor say together."""
+"""The monitor's score: what innovations, parity residuals and single sensors say together."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -166,7 +166,7 @@ class MeanParts:
 
 @dataclass(frozen=True)
 class InnovationScores:
-    """The monitor's score: the mean of its parts, one sensor's noise or shift, whichever is rarer.
+    """The monitor's score: the mean of its parts, one sensor's noise or its shift, whichever is rarest.
 
     A mean would dilute one noisy sensor, which the other parts hardly see, and one that reads
     wrong, which they soon forget; so ``noise`` and ``shift``, where it is sought, stand beside it.

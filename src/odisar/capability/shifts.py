@@ -6,7 +6,10 @@ likelihood ratio (Willsky and Jones, IEEE Trans. Automatic Control 1976) asks al
 any possible onset how much better a shift along its signature explains them than nothing does. That
 alone would not let go, as the end of a shift looks like the onset of one the other way. So a shift
 that is still there is held against one that has ended: both of its steps are in that one's
-signature, and it explains more as soon as the second one has come.
+signature, and it explains more as soon as the second one has come. So does a single wrong sample
+(an additive outlier beside the level shift: Chen and Liu, J. American Statistical Association
+1993); what is wrong for a few samples, less than the closed form looks back, is not told from a
+shift, and held for as long as that is remembered or consistency bears it out.
 """
 
 from collections.abc import Sequence
@@ -24,7 +27,8 @@ from odisar.capability.responses import StepResponse
 _SMALLEST = np.finfo(np.float64).tiny
 #: Samples whose responses are in memory at a time, beside those that the memory reaches back to.
 _CHUNK = 1024
-#: So many standard deviations out an innovation is drawn in: sums must still tell small ones apart.
+#: So many standard deviations out innovations and samples are drawn in: sums over time, of which
+#: differences are taken, must still tell small ones apart.
 _FURTHEST = 1.0e4
 #: No ratio below it is rare, however quiet held-out recordings were: chance alone exceeds it once
 #: in a hundred samples (chi-square with one degree of freedom).
@@ -38,8 +42,8 @@ _BEYOND = 2.0
 class ShiftSteps:
     """How shifts are sought (``score.shift`` of a case in params.yaml).
 
-    ``memory`` is how many samples ago one may have set in, and how many it may have lasted;
-    ``margin`` is how much further out than elsewhere it must be, on the common log scale. The end
+    ``memory`` is among how many samples, the last ones, its onset or its end is sought, and how
+    long one that has ended may have lasted; ``margin`` is how much further out than elsewhere it must be, on the common log scale. The end
     of one that has lasted longer, and left no trace since, is taken for the onset of another.
     """
 
@@ -77,7 +81,8 @@ class ShiftFilter:
         for start in range(0, len(innovations), _CHUNK):
             first, stop = max(0, start - reach), min(start + _CHUNK, len(innovations))
             seen = _drawn_in(np.nan_to_num(innovations[first:stop]), precision)
-            ratios = _ratios(self.response.at(samples[first:stop]), seen, precision, memory)
+            shown = self.response.at(np.clip(samples[first:stop], -_FURTHEST, _FURTHEST))
+            ratios = _ratios(shown, seen, precision, memory)
             found[start:stop] = ratios[start - first :]
         return np.where(np.isfinite(innovations).all(axis=1), found, np.nan)
 
@@ -131,37 +136,48 @@ def _ratios(
 ) -> FloatArray:
     """Return (time,) ratios of one piece; ``response`` (age, time, state feature, state)."""
     weighed = precision @ response
+    one_older = np.concatenate([weighed[1:], weighed[-1:]])
     along = _Since.of(np.einsum("atfs,tf->ats", weighed, innovations))
     size = _Since.of(np.einsum("atfs,atfs->ats", weighed, response))
+    single = _Since.of(np.einsum("atfs,atfs->ats", one_older, response))
     both = _Since.of(np.einsum("tfs,atfs->ats", weighed[-1], response))
     lasting = np.zeros_like(along.newest)
-    for age in range(memory):
+    for age in range(min(memory, len(innovations))):
         value = along.until(age) ** 2 / np.maximum(size.until(age), _SMALLEST)
         np.maximum(lasting[age:], value, out=lasting[age:])
-    ended = _ended(along, size, both, memory)
+    ended = _ended(along, size, (single, both), memory)
     return np.asarray(np.maximum(0.0, lasting.max(axis=1) - ended.max(axis=1)))
 
 
-def _ended(along: "_Since", size: "_Since", both: "_Since", memory: int) -> FloatArray:
+def _ended(
+    along: "_Since", size: "_Since", shared: tuple["_Since", "_Since"], memory: int
+) -> FloatArray:
     """Return (time, state) how much a shift explains that has ended within ``memory`` samples.
 
-    It had lasted until its signature no longer changed; shorter ones are noise. What its end leaves
-    changes as long again: beyond that age, an end explains what it did then.
+    It had lasted one sample, an outlier, or until its signature no longer changed; ``shared`` is
+    what the signatures of its onset and its end have in common, in either case. Allowed to last any
+    time between, it would explain much of what is usual. What its end leaves changes as long
+    again: beyond that age, an end explains what it did then.
     """
+    single, both = shared
     oldest = along.oldest
+    ends = [(along.until(age), size.until(age)) for age in range(oldest + 1)]
+    best = [np.zeros_like(end_along) for end_along, _ in ends]
+    # The onset's age is outside, as its sums are the costly ones.
+    for onset in range(1, min(memory + oldest, len(along.newest))):
+        along_onset, size_onset = along.until(onset), size.until(onset)
+        for age, (end_along, end_size) in enumerate(ends):
+            lasted = onset - age
+            if lasted == 1 or oldest <= lasted < memory:
+                common = (single if lasted == 1 else both).until(age)[lasted:]
+                own = size_onset + end_size[lasted:] - 2.0 * common
+                value = (along_onset - end_along[lasted:]) ** 2 / np.maximum(own, _SMALLEST)
+                np.maximum(best[age][lasted:], value, out=best[age][lasted:])
+    later = max(1, memory - oldest)
+    best[-1] = pd.DataFrame(best[-1]).rolling(later, min_periods=1).max().to_numpy()
     ended = np.zeros_like(along.newest)
-    for age in range(oldest + 1):
-        best = np.zeros_like(along.until(age))
-        end_along, end_size, end_both = along.until(age), size.until(age), both.until(age)
-        for lasted in range(oldest, memory):
-            explained = along.until(lasted + age) - end_along[lasted:]
-            own = size.until(lasted + age) + end_size[lasted:] - 2.0 * end_both[lasted:]
-            value = explained**2 / np.maximum(own, _SMALLEST)
-            np.maximum(best[lasted:], value, out=best[lasted:])
-        if age == oldest:
-            later = max(1, memory - oldest)
-            best = pd.DataFrame(best).rolling(later, min_periods=1).max().to_numpy()
-        np.maximum(ended[age:], best, out=ended[age:])
+    for age, most in enumerate(best):
+        np.maximum(ended[age:], most, out=ended[age:])
     return ended
 
 

@@ -127,6 +127,13 @@ class Config(Section):
                     f"than twin.closed_form_lags={self.twin.closed_form_lags}: lengthen it, or "
                     "let the closed form look back less"
                 )
+            shift = case.score.shift
+            if shift is not None and shift.memory_steps <= self.twin.closed_form_lags:
+                raise ValueError(
+                    f"cases.{name}.score.shift.memory_steps={shift.memory_steps} is no longer "
+                    f"than twin.closed_form_lags={self.twin.closed_form_lags}: no end of a shift "
+                    "could be told; lengthen it, or say shift: null"
+                )
         return self
 
     def case_of(self, setup: str) -> Case:

@@ -9,7 +9,7 @@ from odisar.config.base import NonNegativeFloat, PositiveInt, Section
 #: What is usual and rare on held-out recordings isn't known from fewer scores.
 FEWEST_KNOWN = 20
 
-#: Time and memory grow with that of shifts.
+#: Computing time and storage grow with the memory for shifts.
 LONGEST_MEMORY = 1000
 
 _Weight = Annotated[float, Field(ge=0, lt=1)]
@@ -66,8 +66,8 @@ class NoiseConfig(Section):
 class ShiftConfig(Section):
     """How far back a shift of one state is sought, and how rare it must be.
 
-    One may have set in ``memory_steps`` samples ago and have lasted as many; ``margin`` is taken
-    off, as that of noise is.
+    Its onset is sought among the last ``memory_steps`` samples; ``margin`` is taken off, as that of
+    noise is.
     """
 
     memory_steps: Annotated[int, Field(ge=1, le=LONGEST_MEMORY)]

@@ -18,6 +18,7 @@ MANIFEST_FILE = "manifest.json"
 #: 3: it takes the consistency of one sample in.
 #: 4: it takes the noise of one sensor and the scatter over many samples in.
 #: 5: it lets go of something strong that is over.
+#: 6: it seeks the shift of one state.
 SCHEMA_VERSION = 6
 #: No manifest is longer, no other JSON, and no file of a bundle at all: bytes.
 MANIFEST_LIMIT = 1_000_000

@@ -134,7 +134,7 @@ class _Seen:
 
 
 def _scale(one: Candidate, usual: Sequence[Statistics]) -> LogScale | None:
-    """Return what puts a candidate on the scale of noise: held-out recordings are as rare there.
+    """Return what puts a candidate on the scale of noise and shift, of held-out recordings.
 
     One without noise and shift beside needs none.
     """

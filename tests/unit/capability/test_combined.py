@@ -86,6 +86,15 @@ def test_the_whole_is_the_largest_of_mean_noise_and_shift_on_one_log_scale(score
     assert found.dtype == np.float32
 
 
+@pytest.mark.parametrize("name", HEARING)
+def test_what_holds_a_shift_back_is_the_lasting_part_of_consistency(scores, name):
+    run = replace(invented_run("fresh", 300), shifts=lambda values, *_: np.full(len(values), 1e9))
+    known = slice(scores.known_after_steps, None)
+    wanted = shift_of(scores, run, name)[known]
+    found = np.log(scores.of(run)[name][known])
+    np.testing.assert_allclose(found, scores.release.of(wanted), rtol=1e-4, atol=1e-5)
+
+
 def test_a_shift_raises_the_whole_alone_and_none_is_heard_where_none_is_sought(scores):
     run = invented_run("fresh", 300)
     shifted = replace(run, shifts=lambda values, *_: np.full(len(values), 1e6))

@@ -5,7 +5,7 @@ import pytest
 
 from odisar.capability.innovations import LogScale
 from odisar.capability.responses import StepResponse
-from odisar.capability.shifts import ShiftFilter, ShiftSteps, StateShift
+from odisar.capability.shifts import ShiftFilter, ShiftSteps, StateShift, _drawn_in
 from odisar.seeding import generator
 
 MEMORY = 8
@@ -51,7 +51,8 @@ def by_hand(samples, innovations, now):
     for state in range(2):
         for newer in range(max(0, now - MEMORY + 1), now + 1):
             lasting.append(explained(signature(state, newer), seen))
-            for lasted in range(oldest, min(MEMORY, newer + 1)):
+            # A single wrong sample, or a shift that lasted until its signature no longer changed.
+            for lasted in (n for n in (1, *range(oldest, MEMORY)) if n <= newer):
                 pulse = signature(state, newer - lasted) - signature(state, newer)
                 ended.append(explained(pulse, seen))
     return max(0.0, max(lasting) - max(ended))
@@ -107,8 +108,12 @@ def test_a_ratio_knows_nothing_of_what_comes_later_nor_of_pieces(monkeypatch):
     samples, innovations = random_run("later", 90)
     whole = ratios(samples, innovations)
     np.testing.assert_array_equal(ratios(samples[:50], innovations[:50]), whole[:50])
-    monkeypatch.setattr("odisar.capability.shifts._CHUNK", 7)
-    np.testing.assert_allclose(ratios(samples, innovations), whole, atol=1e-10)
+    # What set in and ended as long ago as can be told counts too.
+    innovations = 0.1 * innovations + shifted(0.3 * samples, 0, 20, 27)
+    whole = ratios(samples, innovations)
+    for chunk in (1, 7):
+        monkeypatch.setattr("odisar.capability.shifts._CHUNK", chunk)
+        np.testing.assert_allclose(ratios(samples, innovations), whole, atol=1e-10)
 
 
 @pytest.mark.parametrize("steps", [0, 1, 2, 5, 9])
@@ -123,11 +128,26 @@ def test_where_there_is_no_innovation_there_is_no_ratio_and_extreme_ones_blind_n
     samples, innovations = random_run("extreme", 60)
     samples *= 0.1
     quiet = ratios(samples, innovations)
-    innovations[0], innovations[20] = np.nan, 1e200
+    innovations[0], innovations[20], innovations[30, 1] = np.nan, 1e200, np.nan
+    samples[22], samples[23] = np.inf, 1e30
     found = ratios(samples, innovations)
-    assert np.isnan(found[0])
-    assert np.isfinite(found[1:]).all()
-    np.testing.assert_allclose(found[40:], quiet[40:], atol=1e-3)
+    assert np.flatnonzero(np.isnan(found)).tolist() == [0, 30]
+    np.testing.assert_allclose(found[45:], quiet[45:], atol=1e-2)
+
+
+def test_far_out_innovations_are_drawn_in_along_their_direction():
+    precision = np.diag([4.0, 0.25])
+    far = np.array([[1e6, 0.0], [0.0, -1e6], [1e6, 4e6], [100.0, 9999.0]])
+    wanted = [[5000, 0], [0, -20000], [5000, 20000], [100, 9999]]
+    np.testing.assert_allclose(_drawn_in(far, precision), wanted)
+
+
+@pytest.mark.parametrize("state", [0, 1])
+def test_a_single_wrong_sample_is_no_shift(state):
+    samples = 0.3 * random_run("calm", 120)[0]
+    found = ratios(samples, 3.0 * shifted(samples, state, 40, 41), memory=60)
+    assert found[40] > 5
+    assert found[41:].max() < 1
 
 
 def test_the_score_is_the_mean_less_a_margin_no_further_out_than_consistency_and_a_little():
