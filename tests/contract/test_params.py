@@ -58,6 +58,11 @@ def test_every_profile_is_valid(raw, profile):
             21,
             "context_steps=20 is shorter than twin.closed_form_lags",
         ),
+        (
+            ("cases", "robot", "score", "shift", "memory_steps"),
+            5,
+            "memory_steps=5 is no longer than twin.closed_form_lags=5",
+        ),
         (("pipeline", "setups"), ["nothing"], "'nothing' is not declared under setups"),
         (("setups", "vessel-all", "case"), "boat", "'boat' is not declared under cases"),
         (("cases", "vessel", "channels"), [], "cases.vessel.channels"),

@@ -166,7 +166,7 @@ class MeanParts:
 
 @dataclass(frozen=True)
 class InnovationScores:
-    """The monitor's score: the mean of its parts, one sensor's noise or its shift, whichever is rarest.
+    """The monitor's score: the rarest of the mean of its parts, one sensor's noise, and its shift.
 
     A mean would dilute one noisy sensor, which the other parts hardly see, and one that reads
     wrong, which they soon forget; so ``noise`` and ``shift``, where it is sought, stand beside it.

@@ -9,7 +9,7 @@ import pytest
 from odisar.capability.assessment import Capability, Thresholds, blame_windows
 from odisar.capability.responses import blamed_names
 from odisar.capability.scoring import Scorer
-from odisar.capability.signatures import alarm_starts
+from odisar.capability.signatures import Signatures, alarm_starts
 from odisar.recordings.schema import Recording
 from odisar.seeding import generator
 from small_innovations import fit_scores, small_scorer
@@ -111,6 +111,25 @@ def test_after_a_gap_blame_begins_anew(scorer):
         found.append(blame_windows(scorer, item, scores, np.flatnonzero(known)))
     assert len(found[0]) > 100
     np.testing.assert_allclose(*found, rtol=1e-4, atol=1e-5)
+
+
+def test_blame_is_told_where_the_monitors_score_is_rare_run_by_run(scorer, monkeypatch):
+    told = []
+
+    def blame(_, innovations, samples, windows, directions, is_rare):
+        told.append(is_rare)
+        assert len(innovations) == len(samples) == len(directions) == len(is_rare)
+        return np.zeros((len(windows), 2))
+
+    monkeypatch.setattr(Signatures, "blame", blame)
+    recording = with_fault(make_recording("gap"), 1, "bias", 0.2)
+    parted = replace(recording, segments=((0, 120), (120, 300)))
+    scores = scorer.score(parted, short_lead_steps=3)
+    blame_windows(scorer, parted, scores, np.arange(len(scores.positions)))
+    found = np.concatenate(told)
+    np.testing.assert_array_equal(found, scores.scores["odisar"] >= np.e)
+    assert [len(run) for run in told] == [stop - start for start, stop in scores.runs]
+    assert 0 < found.sum() < len(found)
 
 
 def test_of_no_windows_nobody_is_blamed(scorer):

@@ -25,6 +25,9 @@ def score():
         ("scatter", "steps", 0),
         ("scatter", "share", -0.1),
         ("scatter", "share", 1.0),
+        ("shift", "memory_steps", 0),
+        ("shift", "memory_steps", 1001),
+        ("shift", "margin", -0.1),
         ("release", "steps", 0),
         ("release", "share", 1.1),
         ("release", "share", -0.1),
@@ -43,6 +46,13 @@ def test_what_can_be_no_window_or_weight_is_refused_where_it_stands(score, part,
 def test_no_window_or_weight_has_a_default(score, part, key):
     del score[part][key]
     with pytest.raises(ValidationError, match=rf"{part}\.{key}"):
+        ScoreConfig.model_validate(score)
+
+
+def test_that_no_shift_is_sought_is_said_by_null_and_not_by_silence(score):
+    assert ScoreConfig.model_validate(score | {"shift": None}).shift is None
+    del score["shift"]
+    with pytest.raises(ValidationError, match="shift"):
         ScoreConfig.model_validate(score)
 
 
@@ -67,6 +77,7 @@ def test_no_margin_no_scatter_and_no_release_are_declared_by_zero(score, part, k
         ("scatter", {"steps": 50, "share": 0.0}, 10),
         # Of two innovations the first can't be judged.
         ("noise", {"lasting_steps": 50}, 51),
+        ("shift", {"memory_steps": 50}, 10),
         ("release", {"steps": 50}, 10),
     ],
 )

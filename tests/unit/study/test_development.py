@@ -145,7 +145,7 @@ def test_a_cell_is_a_part_of_the_weather_and_its_strength(table):
     assert cells.to_dict() == {("waves", 0.05): 2, ("wind", 0.05): 1}
 
 
-def test_only_candidates_with_noise_are_ranked(table):
+def test_only_candidates_with_noise_and_shift_are_ranked(table):
     ranks = table.groupby("candidate", sort=False)["rank"].first()
     assert ranks.notna().tolist() == ["; or noise of one sensor" in name for name in ranks.index]
     assert sorted(ranks.dropna()) == list(range(1, int(ranks.notna().sum()) + 1))
