@@ -4,7 +4,13 @@ from functools import partial
 
 import numpy as np
 
-from odisar.capability.combined import InnovationScores, Run, ScoreSteps
+from odisar.capability.combined import (
+    ODISAR,
+    WITHOUT_TRANSFORMER,
+    InnovationScores,
+    Run,
+    ScoreSteps,
+)
 from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import InnovationSteps, conditional_squares, squared_distance
 from odisar.capability.outliers import NoiseSteps
@@ -13,6 +19,8 @@ from odisar.capability.shifts import ShiftSteps
 from odisar.seeding import generator
 
 STATES = (0, 1)
+#: Detectors that listen to single sensors.
+HEARING = (ODISAR, WITHOUT_TRANSFORMER)
 STEPS = ScoreSteps(
     innovation=InnovationSteps(mean=6, size=4, recent=2, recent_share=0.25),
     consistency=InnovationSteps(mean=8, size=4, recent=2, recent_share=0.25),
@@ -48,3 +56,17 @@ def invented_scores(steps: ScoreSteps = STEPS) -> InnovationScores:
     runs = [invented_run("values"), invented_run("more", 150)]
     relations = Consistency.fit(np.concatenate([run.samples for run in runs]), STATES)
     return InnovationScores.fit(runs, relations, steps)
+
+
+def noise_of(scores: InnovationScores, run: Run) -> np.ndarray:
+    """Return what the noise of one sensor says along a run."""
+    return scores.noise.score(run.outliers(scores.parts.closed_form.size.precision))
+
+
+def shift_of(scores: InnovationScores, run: Run, name: str) -> np.ndarray:
+    """Return what its shift says to a detector, put together from its parts."""
+    parts, memory = scores.parts, scores.shift.steps.memory
+    closed = run.shifts(run.closed_form, parts.closed_form.size.precision, memory)
+    twin = run.shifts(run.innovations, parts.twin.size.precision, memory)
+    tied = parts.consistency.parts(parts.relations.residuals(run.samples)).max(axis=0)
+    return scores.shift.score(twin if name == ODISAR else None, closed, tied)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace, write_table
 from odisar.capability.combined import ODISAR, InnovationScores
+from odisar.capability.consistency import Consistency
 from odisar.capability.innovations import (
     FloatArray,
     InnovationLimit,
@@ -200,10 +201,12 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
         )
     raw[RECONSTRUCTION] = lambda _, s: s.scores[RECONSTRUCTION].astype(np.float64)
     made = {name: _scaled(make, held_out) for name, make in raw.items()}
-    return made | _beside(data, scorer, held_out)
+    return made | _beside(data, scorer, held_out, relations)
 
 
-def _beside(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[str, Maker]:
+def _beside(
+    data: MemberData, scorer: Scorer, held_out: HeldOut, relations: Consistency
+) -> dict[str, Maker]:
     """Return what makes the noise of one sensor, and its shift, without a margin."""
     runs = [run for item, scores in held_out for run in scorer.runs(item, scores)]
     asked = score_steps(data.case.score)
@@ -212,7 +215,7 @@ def _beside(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[str, Ma
         noise=replace(asked.noise, margin=0.0),
         shift=None if asked.shift is None else replace(asked.shift, margin=0.0),
     )
-    fitted = InnovationScores.fit(runs, fit_relations(data, scorer.twin), steps)
+    fitted = InnovationScores.fit(runs, relations, steps)
     precision = fitted.parts.closed_form.size.precision
 
     def noise(item: Recording, scores: RecordingScores) -> FloatArray:

@@ -93,27 +93,20 @@ def chosen() -> list:
     ]
 
 
-def test_noise_is_the_monitors_own_without_its_margin(data, scorer, makers):
+def test_noise_and_shift_are_the_monitors_own_without_their_margins(data, scorer, makers):
     fitted = fit_innovation_scores(scorer, data)
-    assert fitted.noise.steps.margin > 0
+    assert (fitted.noise.steps.margin, fitted.shift.steps.margin) > (0, 0)
     item = make_recording("fresh", 120)
     scores = scorer.score(item, short_lead_steps=3)
     (run,) = scorer.runs(item, scores)
-    wanted = fitted.noise.score(run.outliers(fitted.parts.closed_form.size.precision))
-    found = makers[NOISE](item, scores)
-    np.testing.assert_allclose(found, wanted + fitted.noise.steps.margin)
-    assert np.isfinite(found[fitted.noise.known_after_steps :]).all()
-
-
-def test_a_shift_is_the_monitors_own_without_its_margin(data, scorer, makers):
-    fitted = fit_innovation_scores(scorer, data)
-    assert fitted.shift.steps.margin > 0
-    item = make_recording("fresh", 120)
-    scores = scorer.score(item, short_lead_steps=3)
-    (run,) = scorer.runs(item, scores)
-    wanted = fitted.shifts(run)[ODISAR] + fitted.shift.steps.margin
-    np.testing.assert_allclose(makers[SHIFT](item, scores), wanted)
-    assert np.isfinite(wanted[fitted.known_after_steps :]).all()
+    noise = fitted.noise.score(run.outliers(fitted.parts.closed_form.size.precision))
+    for name, said, margin in (
+        (NOISE, noise, fitted.noise.steps.margin),
+        (SHIFT, fitted.shifts(run)[ODISAR], fitted.shift.steps.margin),
+    ):
+        found = makers[name](item, scores)
+        np.testing.assert_allclose(found, said + margin)
+        assert np.isfinite(found[fitted.known_after_steps :]).all()
 
 
 def test_where_no_shift_is_sought_none_is_heard(data, scorer):
