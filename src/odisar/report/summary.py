@@ -18,9 +18,10 @@ _METHOD = (
     "A twin learns from undisturbed recordings to forecast the next sample and a horizon. The "
     "score holds what it, and the closed form it stands on, said about now against what is "
     "observed (the innovations), each state of the sample against what the others say it should "
-    "be (consistency), how well the twin reconstructs its own forecast, and whether samples of one "
-    "sensor are off by themselves (noise); where that is rarer than on undisturbed recordings, the "
-    "machine is taken to be out of distribution. The paper's score is the reconstruction alone."
+    "be (consistency), how well the twin reconstructs its own forecast, and whether one sensor's "
+    "samples are off by themselves (noise) or have been off together since some moment (a shift); "
+    "where that is rarer than on undisturbed recordings, the machine is taken to be out of "
+    "distribution. The paper's score is the reconstruction alone."
 )
 
 
