@@ -155,11 +155,15 @@ def analytic_scores() -> InnovationScores:
     limit = InnovationLimit(np.array([[1.2, 0.1], [0.1, 0.9]]), 0.7)
     mean = MeanInnovation(4, np.array([[2.0, 0.3], [0.3, 1.0]]), LogScale(-0.5, 1.5), limit)
     size = InnovationSize(2, np.array([[1.5, -0.2], [-0.2, 0.8]]), LogScale(-0.7, 0.9))
+    newer = (
+        MeanInnovation(2, np.array([[1.1, 0.2], [0.2, 0.6]]), LogScale(0.4, 2.6), limit),
+        InnovationSize(1, np.array([[1.5, -0.2], [-0.2, 0.8]]), LogScale(-0.2, 1.9)),
+    )
     recent = MeanInnovation(2, np.array([[0.9, 0.1], [0.1, 0.7]]), LogScale(-0.8, 1.9), None)
     parts = MeanParts(
-        InnovationScore(mean, size, recent, 0.3, LogScale(-0.2, 0.1)),
-        InnovationScore(mean, size, recent, 0.3, None),
-        InnovationScore(mean, size, recent, 0.4, None),
+        InnovationScore(mean, size, *newer, recent, 0.3, LogScale(-0.2, 0.1)),
+        InnovationScore(mean, size, *newer, recent, 0.3, None),
+        InnovationScore(mean, size, *newer, recent, 0.4, None),
         analytic_relations(),
         share_holding=0.5,
         scatter=None,

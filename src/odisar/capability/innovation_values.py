@@ -196,8 +196,9 @@ class InnovationScoreValues(Section):
         """How many state features the covariances are of; more than one number fits no twin."""
         parts: list[Covariant] = []
         for score in (self.twin, self.closed_form, self.consistency):
-            parts += [score.mean, score.size, score.recent]
-            parts += [mean.limit for mean in (score.mean, score.recent) if mean.limit is not None]
+            means = (score.mean, score.newer_mean, score.recent)
+            parts += [*means, score.size, score.newer_size]
+            parts += [mean.limit for mean in means if mean.limit is not None]
         if self.scatter is not None:
             parts += [self.scatter.twin, self.scatter.closed_form]
         return {len(part.precision) for part in parts}

@@ -30,6 +30,9 @@ _SHRINKAGE = 1.0e-6
 _USUAL, _RARE = 0.5, 0.99
 #: Single innovations further out than this share of held-out ones are cut back.
 _OUTLYING = 0.95
+#: How much rarer a statistic may be than the same of the newer half of its window, on the common
+#: scale: what lasts shows there as well, by a little less as fewer innovations say so.
+_BEYOND_NEWER = 0.5
 #: Below it a statistic is called zero; its log must stay finite.
 _SMALLEST = 1.0e-12
 
@@ -198,6 +201,16 @@ class InnovationSize:
         return np.asarray(moving_mean(squares, steps).max(axis=1))
 
 
+def newer_half(steps: int) -> int:
+    """Return how many steps are the newer half of a window; of an odd number, the larger one."""
+    return (steps + 1) // 2
+
+
+def held_to_newer(whole: FloatArray, newer: FloatArray) -> FloatArray:
+    """Return (time,) a statistic on the log scale, hardly more than of its window's newer half."""
+    return np.minimum(whole, newer + _BEYOND_NEWER)
+
+
 @dataclass(frozen=True)
 class InnovationSteps:
     """How the score is put together (``score`` of a case in params.yaml).
@@ -220,13 +233,16 @@ class InnovationScore:
     The largest of T2 of the mean innovation, the size of the innovations of the state that scatters
     most and, where there is one, the reconstruction error of the forecast (``reconstruction`` is
     its scale), which notices what any of them does; and, with weight ``recent_share``, T2 of the
-    mean of very few innovations, which lets go as soon as a disturbance has ended. 1 is what is
-    usual on held-out recordings, e = 2.7 what is rare. The monitor's mean has three of these (see
-    ``combined.MeanParts``).
+    mean of very few innovations, which lets go as soon as a disturbance has ended. Mean and size
+    count hardly more than the same of the ``newer`` half of their windows: what only the older half
+    holds is over. 1 is what is usual on held-out recordings, e = 2.7 what is rare. The monitor's
+    mean has three of these (see ``combined.MeanParts``).
     """
 
     mean: MeanInnovation
     size: InnovationSize
+    newer_mean: MeanInnovation
+    newer_size: InnovationSize
     recent: MeanInnovation
     recent_share: float
     reconstruction: LogScale | None
@@ -248,9 +264,12 @@ class InnovationScore:
         ``runs`` are innovations (time, state), ``reconstructions`` reconstruction errors (time,).
         """
         scale = None if reconstructions is None else LogScale.fit(np.concatenate(reconstructions))
+        limit = InnovationLimit.fit(runs)
         return cls(
-            MeanInnovation.fit(runs, steps.mean, InnovationLimit.fit(runs)),
+            MeanInnovation.fit(runs, steps.mean, limit),
             InnovationSize.fit(runs, steps.size),
+            MeanInnovation.fit(runs, newer_half(steps.mean), limit),
+            InnovationSize.fit(runs, newer_half(steps.size)),
             # Of so few the last one has to count for what it is.
             MeanInnovation.fit(runs, steps.recent, None),
             steps.recent_share,
@@ -259,8 +278,12 @@ class InnovationScore:
 
     def parts(self, innovations: FloatArray) -> FloatArray:
         """Return (2, time) mean and size on their common log scale along one gapless run."""
+        pairs = ((self.mean, self.newer_mean), (self.size, self.newer_size))
         return np.stack(
-            [part.scale.of(part.statistic(innovations)) for part in (self.mean, self.size)]
+            [
+                held_to_newer(*(part.scale.of(part.statistic(innovations)) for part in pair))
+                for pair in pairs
+            ]
         )
 
     def score(self, innovations: FloatArray, reconstruction: FloatArray) -> FloatArray:

@@ -67,6 +67,8 @@ class InnovationValues(Section):
 
     mean: MeanValues
     size: StatisticValues
+    newer_mean: MeanValues
+    newer_size: StatisticValues
     recent: MeanValues
     recent_share: Annotated[float, Field(ge=0, lt=1)]
     reconstruction: ScaleValues | None
@@ -78,6 +80,8 @@ class InnovationValues(Section):
         return cls(
             mean=_mean_values(score.mean),
             size=StatisticValues(**statistic_values(score.size)),
+            newer_mean=_mean_values(score.newer_mean),
+            newer_size=StatisticValues(**statistic_values(score.newer_size)),
             recent=_mean_values(score.recent),
             recent_share=score.recent_share,
             reconstruction=None if rebuilt is None else ScaleValues(**vars(rebuilt)),
@@ -89,6 +93,8 @@ class InnovationValues(Section):
         return InnovationScore(
             _mean(self.mean),
             InnovationSize(**statistic_arguments(self.size)),
+            _mean(self.newer_mean),
+            InnovationSize(**statistic_arguments(self.newer_size)),
             _mean(self.recent),
             self.recent_share,
             None if rebuilt is None else LogScale(**rebuilt.model_dump()),

@@ -6,27 +6,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from odisar.capability.combined import SATURATED
-from odisar.capability.innovations import FloatArray
+from odisar.capability.innovations import FloatArray, held_to_newer, newer_half
 from odisar.capability.release import Release
 from odisar.capability.scoring import RECONSTRUCTION
+from odisar.config.score import ScoreConfig
 
 #: Steps of the windows that are tried, and leads of forecasts that are compared with now.
-WINDOWS, LEADS = (1, 3, 5, 10, 20), (5, 10)
+WINDOWS, LEADS = (1, 2, 3, 5, 10, 20), (5, 10)
 WEIGHTS, SIZES, LIMITED = (0.1, 0.3), (3, 5, 10), (10, 20)
-#: Of the few last innovations, and of the sizes of parity residuals, that are offered.
-RECENT, _TIED_SIZES = (1, 3, 5), (3, 10)
+#: Of the few last innovations whose mean has its share.
+RECENT = (2, 3, 5)
+#: Windows of the size that goes with a limited mean, and of parity residuals' mean and size.
+_FULL_SIZES, _TIED = (5, 10), 10
+#: Of the few last parity residuals: how many, and their share. One is from no sample but its own.
+TIED_RECENT = ((1, 0.4), (1, 0.6), (2, 0.4))
 #: The scatter that adds up: over how many innovations, and its share of the mean.
-SCATTER = ((20, 0.2), (60, 0.3), (60, 0.45))
+SCATTER = ((60, 0.3), (60, 0.45))
 #: How much further out than the rest one sensor's noise must be, and its shift, on the common log
-#: scale. Shifts are found with more to spare.
-MARGINS = ((0.0, 0.25), (0.3, 0.5), (0.75, 1.0))
+#: scale.
+MARGINS = ((0.3, 0.5), (0.75, 1.0), (1.0, 1.0))
 #: Letting go, beside not doing so.
-RELEASES = (Release(10, 0.5), Release(60, 0.5), Release(60, 1.0))
+RELEASES = (Release(10, 0.5), Release(10, 1.0), Release(60, 1.0))
 
 #: Before the name of a statistic of the closed form's innovations, of parity residuals.
 CLOSED, PARITY = "closed form's ", "parity residuals' "
 #: The noise of one sensor, and its shift, as the monitor's score has them.
-NOISE, SHIFT = "noise of one sensor", "its shift"
+NOISE, SHIFT = "noise of one sensor", "shift of one sensor"
 
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
@@ -57,10 +62,10 @@ class Candidate:
 def candidates() -> list[Candidate]:
     """Return every candidate, in the order of the table."""
     singles = [f"T2 of mean over {k}" for k in WINDOWS]
-    singles += [f"T2 of limited mean over {k}" for k in LIMITED]
+    singles += [f"T2 of limited mean over {k}" for k in limited_steps()]
     singles += [f"T2 of exponential mean, weight {a:g}" for a in WEIGHTS]
     singles += [f"log NIS over {k}" for k in SIZES] + ["log NIS over 5, by regime"]
-    singles += [f"size of one state over {k}" for k in (*SIZES, *many_steps())]
+    singles += [f"size of one state over {k}" for k in size_steps()]
     singles += [f"T2 of errors {lead} ahead, mean over 10" for lead in LEADS]
     singles += [RECONSTRUCTION]
     singles += [f"{source}{name}" for source in (CLOSED, PARITY) for name in of_limited()]
@@ -73,17 +78,52 @@ def candidates() -> list[Candidate]:
     return made + [
         one
         for steps in LIMITED
-        for size in SIZES
-        for recent in RECENT[1:]
+        for size in _FULL_SIZES
+        for recent in RECENT
         for one in _limited(steps, size, recent)
     ]
 
 
+def shipped(score: ScoreConfig) -> str:
+    """Return the name of the candidate that a case's score is, if it is offered."""
+    made, tied, scatter = score.innovation, score.consistency, score.scatter
+    name = f"mean over {made.mean_steps}, size over {made.size_steps}, reconstruction; "
+    name += f"recent {made.recent_steps} ({made.recent_share:g}); closed form; "
+    name += f"consistency, recent {tied.recent_steps} ({tied.recent_share:g})"
+    if scatter.share:
+        name += f"; scatter over {scatter.steps} ({scatter.share:g})"
+    name += f"; noise {score.noise.margin:g}"
+    if score.shift is not None:
+        name += f", shift {score.shift.margin:g}"
+    if score.release.share:
+        name += f"; release over {score.release.steps} ({score.release.share:g})"
+    return name
+
+
 def of_limited() -> list[str]:
     """Return the statistics that candidates with a limited mean are made of, of each source."""
-    means = [f"T2 of limited mean over {k}" for k in LIMITED]
-    sizes = [f"size of one state over {k}" for k in (*SIZES, *many_steps())]
-    return [*means, *sizes, *(f"T2 of mean over {k}" for k in RECENT)]
+    means = [f"T2 of limited mean over {k}" for k in limited_steps()]
+    sizes = [f"size of one state over {k}" for k in size_steps()]
+    return [*means, *sizes, *(f"T2 of mean over {k}" for k in recent_steps())]
+
+
+def limited_steps() -> list[int]:
+    """Return over how many innovations limited means are taken, newer halves included."""
+    return _with_halves({*LIMITED, _TIED})
+
+
+def size_steps() -> list[int]:
+    """Return over how many innovations sizes are taken, newer halves included."""
+    return sorted({*_with_halves({*SIZES, *_FULL_SIZES, _TIED}), *many_steps()})
+
+
+def recent_steps() -> list[int]:
+    """Return of how many innovations recent means are."""
+    return sorted({*RECENT, *(steps for steps, _ in TIED_RECENT)})
+
+
+def _with_halves(steps: set[int]) -> list[int]:
+    return sorted(steps | {newer_half(k) for k in steps})
 
 
 def many_steps() -> list[int]:
@@ -96,54 +136,69 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
     say as well; the last also with the scatter that adds up, with one sensor's noise and shift
-    beside, and letting go. In between the same without the twin.
+    beside, and letting go. In between the same without the twin. All of them hold mean and size to
+    the newer halves of their windows, as the monitor does.
     """
-    name = f"largest of limited mean over {steps}, size of one state over {size}, reconstruction"
-    name += f"; recent mean over {last} (.7, .3)"
+    name = f"mean over {steps}, size over {size}, reconstruction; recent {last} (0.3)"
     alone, closed = _view("", steps, size, last), _view(CLOSED, steps, size, last)
     made = [
         Candidate(name, 4, alone),
-        Candidate(f"{name}; mean with closed form", 7, lambda s: (alone(s) + closed(s)) / 2),
+        Candidate(f"{name}; closed form", 7, lambda s: (alone(s) + closed(s)) / 2),
     ]
-    for tied_size in _TIED_SIZES:
-        tied = _tied(tied_size)
-        label = f"consistency (size over {tied_size})"
-        whole = f"{name}; mean with closed form and {label}"
-        without = (
-            f"no twin: closed form's limited mean over {steps}, size of one state over {size}; "
-            f"recent mean over {last} (.7, .3); mean with {label}"
-        )
-        made += [
-            Candidate(whole, 10, _mean(alone, closed, tied)),
-            Candidate(without, 6, _mean(closed, tied), uses_twin=False),
-        ]
-    for many, share in SCATTER:
-        added, sizes = f"; scatter over {many} ({share:g})", [f"size of one state over {many}"]
-        sizes.append(f"{CLOSED}{sizes[0]}")
-        mean = _with_scatter(_mean(alone, closed, tied), sizes, share)
-        made.append(Candidate(f"{whole}{added}", 12, mean))
-        mean = _with_scatter(_mean(closed, tied), sizes[1:], share)
-        made.append(Candidate(f"{without}{added}", 7, mean, uses_twin=False))
-    # Those with every part, consistency with the last of its sizes.
-    full = [one for one in made if one.name.startswith(whole)]
-    for one in full:
-        for margins in MARGINS:
-            noise, shift = margins
-            name = f"{one.name}; or {NOISE}, {noise:g}, or {SHIFT}, {shift:g}"
-            heard = replace(one, name=name, parts=one.parts + 4, margins=margins)
-            made.append(heard)
-            for release in RELEASES:
-                name = f"{heard.name}; release over {release.steps} ({release.share:g})"
-                made.append(replace(heard, name=name, release=release))
+    for few, share in TIED_RECENT:
+        tied = _tied(few, share)
+        label = f"consistency, recent {few} ({share:g})"
+        whole = Candidate(f"{name}; closed form; {label}", 10, _mean(alone, closed, tied))
+        without = f"no twin: mean over {steps}, size over {size}; recent {last} (0.3); {label}"
+        free = Candidate(without, 6, _mean(closed, tied), uses_twin=False)
+        full, rest = [whole], [free]
+        for many, part in SCATTER:
+            added, sizes = f"; scatter over {many} ({part:g})", [f"size of one state over {many}"]
+            sizes.append(f"{CLOSED}{sizes[0]}")
+            for one, used, group in ((whole, sizes, full), (free, sizes[1:], rest)):
+                mean = _with_scatter(one.of, used, part)
+                parts = one.parts + len(used)
+                group.append(replace(one, name=f"{one.name}{added}", parts=parts, of=mean))
+        made += [*full, *rest, *(heard for one in full for heard in _beside(one))]
+    return made
+
+
+def _beside(one: Candidate) -> list[Candidate]:
+    """Return a candidate with one sensor's noise and shift beside, and letting go."""
+    made = []
+    for noise, shift in MARGINS:
+        name = f"{one.name}; noise {noise:g}, shift {shift:g}"
+        heard = replace(one, name=name, parts=one.parts + 4, margins=(noise, shift))
+        made.append(heard)
+        for release in RELEASES:
+            name = f"{heard.name}; release over {release.steps} ({release.share:g})"
+            made.append(replace(heard, name=name, release=release))
     return made
 
 
 def _view(source: str, steps: int, size: int, last: int) -> Callable[[Statistics], FloatArray]:
     """Return what the innovations of one source say: of the twin, or of its closed form."""
-    names = [f"T2 of limited mean over {steps}", f"size of one state over {size}"]
-    lasting = (*(f"{source}{name}" for name in names), *([] if source else [RECONSTRUCTION]))
     recent = f"{source}T2 of mean over {last}"
-    return lambda s: 0.7 * _largest(s, lasting) + 0.3 * s[recent]
+
+    def of(s: Statistics) -> FloatArray:
+        lasting = _lasting(s, source, steps, size)
+        if not source:
+            lasting = np.maximum(lasting, s[RECONSTRUCTION])
+        return 0.7 * lasting + 0.3 * s[recent]
+
+    return of
+
+
+def _lasting(s: Statistics, source: str, steps: int, size: int) -> FloatArray:
+    """Return the larger of limited mean and size, either held to the newer half of its window."""
+    windows = (("T2 of limited mean", steps), ("size of one state", size))
+    held = [
+        held_to_newer(
+            s[f"{source}{name} over {many}"], s[f"{source}{name} over {newer_half(many)}"]
+        )
+        for name, many in windows
+    ]
+    return np.asarray(np.max(held, axis=0))
 
 
 def _with_scatter(
@@ -163,11 +218,10 @@ def _mean(*views: Callable[[Statistics], FloatArray]) -> Callable[[Statistics], 
     return of
 
 
-def _tied(size: int) -> Callable[[Statistics], FloatArray]:
-    """Return what parity residuals say: no sample before the last is in one, so one is recent."""
-    lasting = (f"{PARITY}T2 of limited mean over 10", f"{PARITY}size of one state over {size}")
-    recent = f"{PARITY}T2 of mean over 1"
-    return lambda s: 0.6 * _largest(s, lasting) + 0.4 * s[recent]
+def _tied(few: int, share: float) -> Callable[[Statistics], FloatArray]:
+    """Return what parity residuals say."""
+    recent = f"{PARITY}T2 of mean over {few}"
+    return lambda s: (1 - share) * _lasting(s, PARITY, _TIED, _TIED) + share * s[recent]
 
 
 def _combined(label: str, mean: str, size: str) -> list[Candidate]:

@@ -1,126 +1,141 @@
 """Scores on development recordings: what the default was chosen by, and what else there was.
 
-The rule: of the candidates that can be chosen, a case's is the one with the highest mean over cells
-(kind and strength) of (AUROC + TNR@TPR95) / 2 by protocol P2. No test recording has a part in it.
-Those can be that use the twin and have one sensor's noise and shift beside: the ferry's development
-recordings hold weather alone, and by them a detector had better not listen to its sensors.
+The rule: by the mean over cells (kind and strength) of (AUROC + TNR@TPR95) / 2, protocol P2. Of the
+candidates that can be chosen and are level with the highest, or nearly, a case's is the one with
+the highest F1. That is at mu + k sigma of validation recordings: those that calibrate thresholds
+have no part in it, nor has any test recording. Those can be chosen that use the twin and have one
+sensor's noise and shift beside: the ferry's development recordings hold weather alone, and by them
+a detector had better not listen to its sensors.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from odisar.artifacts import Workspace, write_table
-from odisar.capability.combined import ODISAR, InnovationScores
-from odisar.capability.consistency import Consistency
-from odisar.capability.innovations import (
-    FloatArray,
-    InnovationLimit,
-    InnovationSize,
-    LogScale,
-    MeanInnovation,
-    fit_precision,
-    moving_mean,
-    squared_distance,
-)
-from odisar.capability.scoring import RECONSTRUCTION, RecordingScores, Scorer
+from odisar.capability.innovations import FloatArray, LogScale
+from odisar.capability.scoring import RecordingScores, Scorer
+from odisar.capability.thresholds import sigma_threshold
 from odisar.config.loader import ConfigView
 from odisar.errors import OdisarError
 from odisar.evaluation.labels import label_active
-from odisar.evaluation.metrics import auroc, tnr_at_tpr95
-from odisar.recordings.schema import Recording
-from odisar.stages.detectors import fit_relations, score_steps
-from odisar.stages.members import Member, MemberData, load_member
-from odisar.study.candidates import (
-    CLOSED,
-    LEADS,
-    LIMITED,
-    NOISE,
-    PARITY,
-    RECENT,
-    SHIFT,
-    SIZES,
-    WEIGHTS,
-    WINDOWS,
-    Candidate,
-    Statistics,
-    candidates,
-    many_steps,
-    of_limited,
+from odisar.evaluation.metrics import (
+    auroc,
+    confusion_of_counts,
+    count_confusion,
+    tnr_at_tpr95,
 )
-from odisar.study.statistics import exponential_mean, lead_errors, log_sizes, regime_distance
+from odisar.recordings.schema import Recording
+from odisar.stages.members import Member, MemberData, load_member
+from odisar.study.candidates import NOISE, SHIFT, Candidate, Statistics, candidates, shipped
+from odisar.study.fitted_statistics import fit_statistics
 from odisar.twin.bundle import read_twin
 from odisar.twin.devices import pick_device
 
 PARAMS = ("seed", "pipeline", "setups", "cases", "capability", "study")
 
+_CANDIDATE = ("setup", "candidate", "parts", "can_be_chosen", "ships")
+_MEASURES = ("auroc", "tnr_at_tpr95", "f1_ood")
+#: Means that differ by no more are level: trainings from other seeds differ by more.
+_LEVEL = 0.0005
+#: Of so many candidates, the first of a set-up, the cells are shown.
+_FIRST = 5
+
 
 def run(config: ConfigView, workspace: Workspace) -> None:
-    """Write development.csv: every candidate on every cell, with the rule's mean and rank."""
+    """Write what every candidate has by the rule, and cell by cell what the first have."""
     rows = []
     for setup in config.study.setups:
         data = load_member(config, workspace, Member(setup, None))
         twin = read_twin(workspace.twin(setup))
         device = pick_device(config.pipeline.accelerator)
         scorer = Scorer(twin, config.capability.scoring_batch, device)
-        rows += _setup_rows(setup, data, scorer)
+        rows += _setup_rows(setup, data, scorer, config.capability.threshold_sigmas)
     if not rows:
         raise OdisarError(
             "the development recordings of study.setups hold no disturbance to choose a score by; "
             "add some (simulators.*.fleet.disturbed.development)"
         )
-    table = pd.DataFrame(rows)
-    write_table(workspace.study_results / "development.csv", ranked(table))
+    cells = pd.DataFrame(rows)
+    table = ranked(cells)
+    write_table(workspace.study_results / "development.csv", table)
+    write_table(workspace.study_results / "development-cells.csv", cells_of_first(cells, table))
 
 
-def ranked(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table with each candidate's mean by the rule, and its rank in its set-up.
+def ranked(cells: pd.DataFrame) -> pd.DataFrame:
+    """Return a row for each candidate: means over its cells, the rule's mean, its rank.
 
-    Only candidates that can be chosen have one.
+    By set-up, the first on top; those that can't be chosen have no rank, and come last.
     """
-    half = (table.auroc + table.tnr_at_tpr95) / 2
-    mean = half.groupby([table.setup, table.candidate], sort=False).transform("mean")
-    table = table.assign(rule_mean=mean, rank=pd.array([pd.NA] * len(table), dtype="Int64"))
-    for _, own in table.groupby("setup", sort=False):
-        first = own[own.can_be_chosen].drop_duplicates("candidate")
-        first = first.sort_values("rule_mean", ascending=False, kind="stable")
-        place = {name: number for number, name in enumerate(first.candidate, start=1)}
-        table.loc[own.index, "rank"] = own.candidate.map(place)
-    return table
+    table = cells.groupby([*_CANDIDATE], sort=False, as_index=False)[[*_MEASURES]].mean()
+    table["rule_mean"] = (table.auroc + table.tnr_at_tpr95) / 2
+    ordered = [_in_order(table[table.setup == setup]) for setup in table.setup.unique()]
+    return pd.concat(ordered, ignore_index=True)
 
 
-def _setup_rows(setup: str, data: MemberData, scorer: Scorer) -> list[dict[str, object]]:
+def _in_order(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the candidates of one set-up by rank."""
+    offered = table[table.can_be_chosen]
+    is_level = offered.rule_mean >= offered.rule_mean.max() - _LEVEL
+    level = offered[is_level].sort_values("f1_ood", ascending=False, kind="stable")
+    rest = offered[~is_level].sort_values("rule_mean", ascending=False, kind="stable")
+    chosen = pd.concat([level, rest])
+    rank = pd.array([*range(1, len(chosen) + 1)], dtype="Int64")
+    ordered: pd.DataFrame = pd.concat([chosen.assign(rank=rank), table[~table.can_be_chosen]])
+    return ordered
+
+
+def cells_of_first(cells: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
+    """Return the cells of a set-up's first candidates, of what ships, of the best beside them."""
+    unranked = table[table["rank"].isna()].sort_values("rule_mean", kind="stable").index
+    best = table.loc[unranked].groupby("setup").tail(1).index
+    shown = table[(table["rank"] <= _FIRST) | table.ships | table.index.isin(best)]
+    named = shown[["setup", "candidate", "rank"]]
+    other = cells.drop(columns=["parts", "can_be_chosen"])
+    found: pd.DataFrame = named.merge(other, on=["setup", "candidate"])
+    return found
+
+
+def _setup_rows(
+    setup: str, data: MemberData, scorer: Scorer, sigmas: float
+) -> list[dict[str, object]]:
     lead = data.case.short_lead_steps
     held_out = [(i, scorer.score(i, short_lead_steps=lead)) for i in data.splits["validation"]]
     makers = fit_statistics(data, scorer, held_out)
+
+    def seen(item: Recording, scores: RecordingScores) -> _Seen:
+        labels = label_active(item.time_s[scores.positions], item.intervals)
+        made = {name: make(item, scores) for name, make in makers.items()}
+        return _Seen(made, labels, scores.runs)
+
     cells: dict[tuple[str, float], list[_Seen]] = {}
     for item in data.splits["development"]:
         if item.info.is_disturbed:
-            scores = scorer.score(item, short_lead_steps=lead)
-            made = {name: make(item, scores) for name, make in makers.items()}
-            labels = label_active(item.time_s[scores.positions], item.intervals)
             # On a ship the parts of the weather that are disturbed, on a robot the kind of fault.
             info = item.info
             kind = info.components if data.case.pose is None else info.disturbance
-            seen = _Seen(made, labels, scores.runs)
-            cells.setdefault((kind, info.strength or 0.0), []).append(seen)
-    usual = [{name: make(item, s) for name, make in makers.items()} for item, s in held_out]
-    offered = [(one, _scale(one, usual)) for one in candidates()]
+            found = seen(item, scorer.score(item, short_lead_steps=lead))
+            cells.setdefault((kind, info.strength or 0.0), []).append(found)
+    usual = [seen(*one) for one in held_out]
+    offered = [_Offered.fit(one, usual, sigmas) for one in candidates()]
+    ours = shipped(data.case.score)
     return [
         {
             "setup": setup,
-            "candidate": one.name,
-            "parts": one.parts,
-            "can_be_chosen": one.can_be_chosen,
+            "candidate": one.candidate.name,
+            "parts": one.candidate.parts,
+            "can_be_chosen": one.candidate.can_be_chosen,
+            "ships": one.candidate.name == ours,
             "kind": kind,
             "strength": strength,
             "recordings": len(members),
-            **_judged(one, scale, members, data.spec.horizon_steps),
+            **_judged(one, members, data.spec.horizon_steps),
         }
-        for one, scale in offered
+        for one in offered
         for (kind, strength), members in sorted(cells.items())
     ]
 
@@ -134,130 +149,51 @@ class _Seen:
     runs: tuple[tuple[int, int], ...]
 
 
-def _scale(one: Candidate, usual: Sequence[Statistics]) -> LogScale | None:
-    """Return what puts a candidate on the scale of noise and shift, of held-out recordings.
+@dataclass(frozen=True)
+class _Offered:
+    """A candidate, what puts its mean on the scale of noise and shift, and its threshold.
 
-    One without noise and shift beside needs none.
+    One without noise and shift beside needs no ``scale``.
     """
-    if one.margins is None:
-        return None
-    return LogScale.fit(np.exp(np.concatenate([one.of(made) for made in usual])))
+
+    candidate: Candidate
+    scale: LogScale | None
+    threshold: float
+
+    @classmethod
+    def fit(cls, one: Candidate, usual: Sequence[_Seen], sigmas: float) -> Self:
+        """Fit on held-out recordings; the threshold is mu + ``sigmas`` sigma."""
+        scale = None
+        if one.margins is not None:
+            means = np.concatenate([one.of(seen.statistics) for seen in usual])
+            scale = LogScale.fit(np.exp(means))
+        unset = cls(one, scale, np.inf)
+        said = np.concatenate([unset.said(seen) for seen in usual])
+        return replace(unset, threshold=sigma_threshold(np.exp(said), sigmas))
+
+    def said(self, seen: _Seen) -> FloatArray:
+        """Return (time,) scores of a recording, on the log scale."""
+        one, statistics = self.candidate, seen.statistics
+        mean = one.of(statistics)
+        if self.scale is None or one.margins is None:
+            return mean
+        noise, shift = statistics[NOISE] - one.margins[0], statistics[SHIFT] - one.margins[1]
+        heard = np.maximum(self.scale.of(np.exp(mean)), noise)
+        heard = np.maximum(heard, np.nan_to_num(shift, nan=-np.inf))
+        if one.release is None:
+            return heard
+        return np.concatenate([one.release.of(heard[start:stop]) for start, stop in seen.runs])
 
 
-def _said(one: Candidate, scale: LogScale | None, seen: _Seen) -> FloatArray:
-    mean = one.of(seen.statistics)
-    if scale is None or one.margins is None:
-        return mean
-    noise, shift = seen.statistics[NOISE] - one.margins[0], seen.statistics[SHIFT] - one.margins[1]
-    heard = np.maximum(scale.of(np.exp(mean)), noise)
-    heard = np.maximum(heard, np.nan_to_num(shift, nan=-np.inf))
-    if one.release is None:
-        return heard
-    return np.concatenate([one.release.of(heard[start:stop]) for start, stop in seen.runs])
-
-
-def _judged(
-    one: Candidate, scale: LogScale | None, members: list[_Seen], horizon_steps: int
-) -> dict[str, float]:
+def _judged(one: _Offered, members: list[_Seen], horizon_steps: int) -> dict[str, float]:
     # As in the pipeline's tables, time before a forecast error could be known is left out.
-    scores = np.concatenate([_said(one, scale, seen)[horizon_steps:] for seen in members])
+    logs = np.concatenate([one.said(seen)[horizon_steps:] for seen in members])
     labels = np.concatenate([seen.labels[horizon_steps:] for seen in members])
-    known = np.isfinite(scores)
+    known = np.isfinite(logs)
+    logs, labels = logs[known], labels[known]
+    confusion = confusion_of_counts(count_confusion(np.exp(logs) > one.threshold, labels))
     return {
-        "auroc": auroc(scores[known], labels[known]),
-        "tnr_at_tpr95": tnr_at_tpr95(scores[known], labels[known]),
+        "auroc": auroc(logs, labels),
+        "tnr_at_tpr95": tnr_at_tpr95(logs, labels),
+        "f1_ood": float(confusion.f1_ood()),
     }
-
-
-HeldOut = list[tuple[Recording, RecordingScores]]
-Maker = Callable[[Recording, RecordingScores], FloatArray]
-
-
-def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[str, Maker]:
-    """Return, by name, what makes (time,) of each statistic on its log scale."""
-    runs = [s.innovations[a + 1 : b] for _, s in held_out for a, b in s.runs]
-    raw: dict[str, Maker] = {}
-    for steps in WINDOWS:
-        mean = MeanInnovation.fit(runs, steps, None)
-        raw[f"T2 of mean over {steps}"] = _along(mean.statistic)
-    for weight in WEIGHTS:
-        raw[f"T2 of exponential mean, weight {weight:g}"] = _along(_exponential(runs, weight))
-    for steps in SIZES:
-        raw[f"log NIS over {steps}"] = _along(log_sizes(runs, steps))
-    for name, statistic in _limited_statistics(runs).items():
-        raw[name] = _along(statistic)
-    closed = [s.closed_form_innovations[a + 1 : b] for _, s in held_out for a, b in s.runs]
-    for name, statistic in _limited_statistics(closed).items():
-        raw[f"{CLOSED}{name}"] = _along(statistic, lambda s: s.closed_form_innovations)
-    relations = fit_relations(data, scorer.twin)
-    residuals = [relations.residuals(s.samples[a + 1 : b]) for _, s in held_out for a, b in s.runs]
-    for name, statistic in _limited_statistics(residuals).items():
-        raw[f"{PARITY}{name}"] = _along(statistic, lambda s: relations.residuals(s.samples))
-    by_regime = regime_distance(data, held_out)
-    raw["log NIS over 5, by regime"] = lambda item, s: moving_mean(np.log1p(by_regime(item, s)), 5)
-    for lead in LEADS:
-        raw[f"T2 of errors {lead} ahead, mean over 10"] = lead_errors(
-            data, scorer, [item for item, _ in held_out], lead, 10
-        )
-    raw[RECONSTRUCTION] = lambda _, s: s.scores[RECONSTRUCTION].astype(np.float64)
-    made = {name: _scaled(make, held_out) for name, make in raw.items()}
-    return made | _beside(data, scorer, held_out, relations)
-
-
-def _beside(
-    data: MemberData, scorer: Scorer, held_out: HeldOut, relations: Consistency
-) -> dict[str, Maker]:
-    """Return what makes the noise of one sensor, and its shift, without a margin."""
-    runs = [run for item, scores in held_out for run in scorer.runs(item, scores)]
-    asked = score_steps(data.case.score)
-    steps = replace(
-        asked,
-        noise=replace(asked.noise, margin=0.0),
-        shift=None if asked.shift is None else replace(asked.shift, margin=0.0),
-    )
-    fitted = InnovationScores.fit(runs, relations, steps)
-    precision = fitted.parts.closed_form.size.precision
-
-    def noise(item: Recording, scores: RecordingScores) -> FloatArray:
-        found = [fitted.noise.score(run.outliers(precision)) for run in scorer.runs(item, scores)]
-        return np.concatenate(found)
-
-    def shift(item: Recording, scores: RecordingScores) -> FloatArray:
-        found = [fitted.shifts(run) for run in scorer.runs(item, scores)]
-        unknown = [np.full(stop - start, np.nan) for start, stop in scores.runs]
-        # Where none is sought, none is heard.
-        return np.concatenate([f.get(ODISAR, none) for f, none in zip(found, unknown, strict=True)])
-
-    return {NOISE: noise, SHIFT: shift}
-
-
-def _limited_statistics(
-    runs: list[FloatArray],
-) -> dict[str, Callable[[FloatArray], FloatArray]]:
-    """Return what ``of_limited`` names, fitted on runs of innovations."""
-    limit = InnovationLimit.fit(runs)
-    fitted = [MeanInnovation.fit(runs, k, limit).statistic for k in LIMITED]
-    fitted += [InnovationSize.fit(runs, k).statistic for k in (*SIZES, *many_steps())]
-    fitted += [MeanInnovation.fit(runs, k, None).statistic for k in RECENT]
-    return dict(zip(of_limited(), fitted, strict=True))
-
-
-def _exponential(runs: list[FloatArray], weight: float) -> Callable[[FloatArray], FloatArray]:
-    precision = fit_precision(np.concatenate([exponential_mean(run, weight) for run in runs]))
-    return lambda innovations: squared_distance(exponential_mean(innovations, weight), precision)
-
-
-def _along(
-    statistic: Callable[[FloatArray], FloatArray],
-    values_of: Callable[[RecordingScores], FloatArray] = lambda scores: scores.innovations,
-) -> Maker:
-    def make(_: Recording, scores: RecordingScores) -> FloatArray:
-        found = values_of(scores)
-        return np.concatenate([statistic(found[a:b]) for a, b in scores.runs])
-
-    return make
-
-
-def _scaled(make: Maker, held_out: HeldOut) -> Maker:
-    scale = LogScale.fit(np.concatenate([make(item, scores) for item, scores in held_out]))
-    return lambda item, scores: scale.of(make(item, scores))

@@ -64,7 +64,11 @@ def test_values_come_back_equal(content):
 
 def test_the_number_of_states_is_that_of_every_covariance(content):
     assert InnovationScoreValues.model_validate(content).states == {2}
-    for part, key in (("closed_form", "recent"), ("scatter", "twin"), ("scatter", "closed_form")):
+    for part, key in (
+        *(("closed_form", name) for name in ("recent", "newer_mean", "newer_size")),
+        ("scatter", "twin"),
+        ("scatter", "closed_form"),
+    ):
         other = copy.deepcopy(content)
         other[part][key]["precision"] = [[1.0]]
         assert InnovationScoreValues.model_validate(other).states == {1, 2}
@@ -120,7 +124,10 @@ def test_a_share_is_between_none_and_all(content, share):
         InnovationScoreValues.model_validate(content)
 
 
-@pytest.mark.parametrize("key", ["mean", "size", "recent", "recent_share", "reconstruction"])
+@pytest.mark.parametrize(
+    "key",
+    ["mean", "size", "newer_mean", "newer_size", "recent", "recent_share", "reconstruction"],
+)
 def test_a_part_that_is_missing_is_named(content, key):
     del content["closed_form"][key]
     with pytest.raises(ValidationError, match=f"closed_form.{key}"):

@@ -1,5 +1,7 @@
 """Innovation scores by their formulas, on innovations of a known distribution."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -185,8 +187,15 @@ def test_a_statistic_that_never_varies_gives_a_scale_nevertheless():
 def test_the_score_is_put_together_from_its_parts_as_documented(score):
     innovations, errors = usual("fresh", 60), rebuilt("fresh", 60)
     mean, size = score.parts(innovations)
-    np.testing.assert_array_equal(mean, score.mean.scale.of(score.mean.statistic(innovations)))
-    np.testing.assert_array_equal(size, score.size.scale.of(score.size.statistic(innovations)))
+    held = 0
+    for part, whole, newer in (
+        (mean, score.mean, score.newer_mean),
+        (size, score.size, score.newer_size),
+    ):
+        said, newly = (one.scale.of(one.statistic(innovations)) for one in (whole, newer))
+        np.testing.assert_array_equal(part, np.minimum(said, newly + 0.5))
+        held += np.count_nonzero(part < said)
+    assert held > 0
     lasting = np.fmax(np.fmax(mean, size), score.reconstruction.of(errors))
     recent = score.recent.scale.of(score.recent.statistic(innovations))
     wanted = np.exp(0.7 * lasting + 0.3 * recent)
@@ -194,6 +203,31 @@ def test_the_score_is_put_together_from_its_parts_as_documented(score):
     np.testing.assert_allclose(found[10:], wanted[10:])
     assert {int(part.argmax()) for part in np.stack([mean, size])[:, 10:].T} == {0, 1}
     assert (score.reconstruction.of(errors)[10:] == lasting[10:]).any()
+
+
+@pytest.mark.parametrize(("steps", "half"), [(1, 1), (2, 1), (5, 3), (10, 5)])
+def test_the_newer_half_of_a_window_is_fitted_on_the_same_innovations(steps, half):
+    runs = [usual("a"), usual("b", 700)]
+    score = InnovationScore.fit(runs, None, InnovationSteps(steps, steps, 1, 0.3))
+    assert (score.newer_mean.steps, score.newer_size.steps) == (half, half)
+    whole = InnovationScore.fit(runs, None, InnovationSteps(half, half, 1, 0.3))
+    assert score.newer_mean.scale == whole.mean.scale
+    assert score.newer_size.scale == whole.size.scale
+    np.testing.assert_array_equal(score.newer_mean.precision, whole.mean.precision)
+    np.testing.assert_array_equal(score.newer_mean.limit.precision, whole.mean.limit.precision)
+
+
+@pytest.mark.parametrize(("part", "ended"), [(0, 49), (1, 47)])
+def test_what_only_the_older_half_of_a_window_holds_is_over(score, part, ended):
+    """Windows are of ten (mean) and five (size): five and three clean samples are newer halves."""
+    innovations = usual("fresh", 200)
+    innovations[20:45] += ROOT @ np.full(STATES, 4.0)
+    whole = (score.mean, score.size)[part]
+    said = whole.scale.of(whole.statistic(innovations))
+    held = score.parts(innovations)[part]
+    assert (held[30:45] > said[30:45] - 0.2).all()
+    assert said[ended] > 1.5
+    assert held[ended] < said[ended] - 1
 
 
 def test_without_a_scale_the_reconstruction_does_not_count():
@@ -242,7 +276,7 @@ def test_the_recent_part_lets_go_as_soon_as_a_bias_has_ended(score):
     innovations = usual("fresh", 200)
     innovations[50:100] += ROOT @ np.full(STATES, 4.0)
     scores = log_scores(score, innovations)
-    patient = InnovationScore(score.mean, score.size, score.recent, 0.0, score.reconstruction)
+    patient = replace(score, recent_share=0.0)
     without = log_scores(patient, innovations)
     during, after = slice(60, 100), slice(103, 106)
     assert scores[after].mean() < without[after].mean()

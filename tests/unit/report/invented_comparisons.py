@@ -80,6 +80,7 @@ def study_tables() -> dict[str, pd.DataFrame]:
         "nonlinearity": pd.DataFrame({"setup": SETUPS, "state": STATES[0], "explained": 0.01}),
         "training-time": pd.DataFrame({"detector": ["codit"], "seconds": [90.0]}),
         "development": pd.DataFrame({"score": ["mean"], "rank": [1]}),
+        "development-cells": pd.DataFrame({"score": ["mean"], "kind": ["wind"]}),
         "dropout": pd.DataFrame({"rate": [0.1], "draws": [20], "coverage": [0.4]}),
         "leakage": pd.concat([probes.assign(setup=setup, member=setup) for setup in SETUPS]),
     }

@@ -8,65 +8,97 @@ import pytest
 
 from odisar.capability.scoring import Scorer
 from odisar.config.loader import load_config
-from odisar.stages.detectors import score_steps
 from odisar.stages.members import MemberData
-from odisar.study.candidates import MARGINS, NOISE, RELEASES, SHIFT, candidates
-from odisar.study.development import fit_statistics, ranked
+from odisar.study.candidates import MARGINS, NOISE, RELEASES, SHIFT, candidates, shipped
+from odisar.study.development import cells_of_first, ranked
+from odisar.study.fitted_statistics import fit_statistics
 from small_bundle import small_case
 from small_system import make_recording
 
 MEAN, SIZE, REBUILT = "T2 of mean over 10", "log NIS over 5", "reconstruction"
 RECENT = "T2 of mean over 3"
-WHOLE = (
-    "largest of limited mean over 20, size of one state over 3, reconstruction; "
-    "recent mean over 5 (.7, .3); mean with closed form and consistency (size over 10)"
-)
-QUIETEST = "; or noise of one sensor, 0, or its shift, 0.25"
-WITH_SCATTER = [11.605 / 3 + 0.3375, 8.36 / 3 + 0.44 + 0.225, 9.13 / 3 + 1.1]
+ALONE = "mean over 20, size over 5, reconstruction; recent 5 (0.3)"
+WHOLE = f"{ALONE}; closed form; consistency, recent 1 (0.4)"
+FREE = "no twin: mean over 20, size over 5; recent 5 (0.3); consistency, recent 1 (0.4)"
+MEANS, SCATTERED = np.array([6.5, 16.9 / 3, 21.7 / 3]), np.array([0.75, 0.5, 0.0])
 
 
 def judged(*rows):
-    """Return a table of (candidate, set-up, AUROC, TNR@TPR95), all to choose from but `free`."""
-    table = pd.DataFrame(rows, columns=["candidate", "setup", "auroc", "tnr_at_tpr95"])
-    return table.assign(can_be_chosen=table.candidate != "free")
+    """Return cells of (candidate, set-up, AUROC, TNR@TPR95, F1), all to choose from but `free`."""
+    names = ["candidate", "setup", "auroc", "tnr_at_tpr95", "f1_ood"]
+    cells = pd.DataFrame(rows, columns=names).assign(parts=3, kind="all", strength=1.0)
+    return cells.assign(can_be_chosen=cells.candidate != "free", ships=cells.candidate == "low")
 
 
 def test_the_mean_is_over_the_cells_of_a_set_up_and_ranks_are_its_own():
     table = ranked(
         judged(
-            ("wide", "x", 0.8, 0.6),
-            ("wide", "x", 1.0, 0.8),
-            ("wide", "y", 0.5, 0.3),
-            ("even", "x", 0.6, 0.4),
-            ("even", "x", 0.6, 0.4),
-            ("even", "y", 0.9, 0.7),
+            ("even", "x", 0.6, 0.4, 0.5),
+            ("even", "x", 0.6, 0.4, 0.5),
+            ("wide", "x", 0.8, 0.6, 0.4),
+            ("wide", "x", 1.0, 0.8, 0.6),
+            ("wide", "y", 0.5, 0.3, 0.1),
+            ("even", "y", 0.9, 0.7, 0.5),
         )
     )
-    means = table.groupby(["setup", "candidate"]).rule_mean.first()
-    assert means["x"].to_dict() == pytest.approx({"wide": 0.8, "even": 0.5})
-    assert means["y"].to_dict() == pytest.approx({"wide": 0.4, "even": 0.8})
-    assert table["rank"].tolist() == [1, 1, 2, 2, 2, 1]
-    assert table.candidate.tolist() == ["wide"] * 3 + ["even"] * 3
+    assert table.setup.tolist() == ["x", "x", "y", "y"]
+    assert table.candidate.tolist() == ["wide", "even", "even", "wide"]
+    assert table["rank"].tolist() == [1, 2, 1, 2]
+    assert table.rule_mean.tolist() == pytest.approx([0.8, 0.5, 0.8, 0.4])
+    assert table.auroc.tolist() == pytest.approx([0.9, 0.6, 0.9, 0.5])
+    assert table.tnr_at_tpr95.tolist() == pytest.approx([0.7, 0.4, 0.7, 0.3])
+    assert table.f1_ood.tolist() == pytest.approx([0.5, 0.5, 0.5, 0.1])
 
 
-def test_what_does_not_use_the_twin_is_compared_and_not_ranked():
-    table = ranked(judged(("free", "x", 1.0, 1.0), ("low", "x", 0.5, 0.5), ("high", "x", 0.6, 0.6)))
-    assert table.set_index("candidate")["rank"].dropna().to_dict() == {"high": 1, "low": 2}
-    assert table.set_index("candidate").rule_mean["free"] == 1.0
+def test_of_those_that_are_level_with_the_highest_the_first_has_the_highest_f1():
+    rows = [
+        ("highest", "x", 0.9, 0.8, 0.3),
+        ("level", "x", 0.8995, 0.8, 0.5),
+        ("as-level", "x", 0.8994, 0.8, 0.5),
+        ("below", "x", 0.898, 0.8, 0.9),
+        ("lower", "x", 0.7, 0.8, 1.0),
+        ("free", "x", 0.9004, 0.9, 1.0),
+    ]
+    table = ranked(judged(*rows))
+    expected = ["level", "as-level", "highest", "below", "lower", "free"]
+    assert table.candidate.tolist() == expected
+    assert table["rank"].tolist()[:5] == [1, 2, 3, 4, 5]
+
+
+def test_what_cannot_be_chosen_is_compared_and_not_ranked():
+    rows = [("free", "x", 1.0, 1.0, 1.0), ("low", "x", 0.5, 0.5, 0.5), ("high", "x", 0.6, 0.6, 0.6)]
+    table = ranked(judged(*rows))
+    assert table.candidate.tolist() == ["high", "low", "free"]
+    assert table["rank"].dropna().tolist() == [1, 2]
+    assert table.rule_mean.tolist() == pytest.approx([0.6, 0.5, 1.0])
     free = [one for one in candidates() if not one.uses_twin]
     assert {one.parts for one in free} == {1, 6, 7}
     for one in free:
         assert one.name.startswith(("no twin", "closed form's", "parity residuals'"))
 
 
+def test_cells_are_kept_of_the_first_of_what_ships_and_of_the_best_beside_them():
+    names = [f"c{number}" for number in range(7)] + ["low", "free", "other"]
+    rows = [(name, "x", 1 - 0.05 * at, 0.5, 0.5) for at, name in enumerate(names)] * 2
+    cells = judged(*rows)
+    cells.loc[cells.candidate == "other", "can_be_chosen"] = False
+    kept = cells_of_first(cells, ranked(cells))
+    expected = ["c0", "c1", "c2", "c3", "c4", "low", "free"]
+    assert kept.candidate.tolist() == [name for name in expected for _ in range(2)]
+    assert kept["rank"].dropna().tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 8, 8]
+    assert kept.auroc.tolist() == pytest.approx(
+        [1 - 0.05 * names.index(name) for name in kept.candidate]
+    )
+
+
 def test_only_what_uses_the_twin_and_has_noise_and_shift_beside_can_be_chosen():
     for one in candidates():
-        beside = "; or noise of one sensor, " in one.name
+        beside = "; noise " in one.name
         assert one.can_be_chosen == beside == (one.margins is not None)
         assert one.uses_twin or not beside
         if beside:
-            said = one.name.partition("; or noise of one sensor, ")[2].partition(";")[0]
-            assert tuple(float(part) for part in said.split(", or its shift, ")) == one.margins
+            said = one.name.partition("; noise ")[2].partition(";")[0]
+            assert tuple(float(part) for part in said.split(", shift ")) == one.margins
     margins = [one.margins for one in candidates() if one.can_be_chosen]
     assert set(margins) == set(MARGINS)
 
@@ -75,7 +107,7 @@ def test_what_has_them_beside_stands_in_the_table_without_them_too():
     every = {one.name: one for one in candidates()}
     for one in every.values():
         if one.can_be_chosen:
-            alone = every[one.name.partition("; or noise")[0]]
+            alone = every[one.name.partition("; noise ")[0]]
             assert (alone.parts, alone.can_be_chosen) == (one.parts - 4, False)
             np.testing.assert_array_equal(alone.of(invented()), one.of(invented()))
 
@@ -92,20 +124,18 @@ def test_each_of_those_is_offered_with_every_way_of_letting_go_and_without():
             assert chosen[name].margins == one.margins
 
 
-def test_shipped_cases_let_go_and_hear_sensors_in_ways_that_are_offered(request):
-    for case in load_config(request.config.rootpath).cases.values():
-        steps = score_steps(case.score)
-        assert steps.release in RELEASES
-        assert (steps.noise.margin, steps.shift.margin) in MARGINS
+def test_what_studied_cases_ship_is_offered(request):
+    config = load_config(request.config.rootpath)
+    offered = {one.name for one in candidates() if one.can_be_chosen}
+    for setup in config.study.setups:
+        assert shipped(config.case_of(setup).score) in offered
 
 
 @pytest.mark.parametrize("names", [("b", "c", "a", "d"), ("d", "a", "c", "b")])
 def test_of_equals_the_first_in_the_table_comes_first(names):
-    rows = [(name, "x", 1.0 if name == "c" else 0.5, 0.5) for name in names]
-    place = ranked(judged(*rows)).set_index("candidate")["rank"]
+    rows = [(name, "x", 1.0 if name == "c" else 0.5, 0.5, 0.5) for name in names]
     others = [name for name in names if name != "c"]
-    assert place["c"] == 1
-    assert [place[name] for name in others] == [2, 3, 4]
+    assert ranked(judged(*rows)).candidate.tolist() == ["c", *others]
 
 
 def invented():
@@ -128,54 +158,32 @@ def test_a_single_statistic_is_a_candidate_as_it_is():
         ("largest of mean, size, reconstruction", 3, [3, 5, 9]),
         ("largest of mean, size, reconstruction; recent mean (.7, .3)", 4, [5.1, 6.5, 9.3]),
         ("largest of mean, size, reconstruction; recent mean (.5, .5)", 4, [6.5, 7.5, 9.5]),
-        ("largest of mean, size, reconstruction; larger recent (.7, .3)", 5, [5.7, 6.5, 9.3]),
+        ("largest of mean, size, reconstruction; larger recent (.7, .3)", 5, [5.4, 6.5, 9.3]),
         ("larger of mean and size of one state", 2, [4, 5, 2]),
-        (
-            (
-                "largest of limited mean over 20, size of one state over 3, reconstruction; "
-                "recent mean over 5 (.7, .3)"
-            ),
-            4,
-            [9.9, 6.4, 7.8],
-        ),
-        (
-            (
-                "largest of limited mean over 20, size of one state over 3, reconstruction; "
-                "recent mean over 5 (.7, .3); mean with closed form"
-            ),
-            7,
-            # (9.9 + .7 * 6 + .3 * 4) / 2 and so on.
-            [7.65, 7.6, 8.3],
-        ),
-        (
-            WHOLE,
-            10,
-            # (9.9 + 5.4 + .6 * 9 + .4 * 1) / 3 and so on.
-            [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0],
-        ),
-        (
-            (
-                "no twin: closed form's limited mean over 20, size of one state over 3; "
-                "recent mean over 5 (.7, .3); mean with consistency (size over 10)"
-            ),
-            6,
-            [5.6, 5.6, 7.4],
-        ),
+        # .7 times the largest of what is held to newer halves, and .3 times the recent mean.
+        (ALONE, 4, [0.7 * 11.5 + 1.5, 0.7 * 6.5 + 1.5, 0.7 * 9 + 1.5]),
+        # (9.55 + .7 * 5.5 + .3 * 4) / 2 and so on.
+        (f"{ALONE}; closed form", 7, [7.3, 7.25, 8.3]),
+        # (9.55 + 5.05 + .6 * 7.5 + .4 * 1) / 3 and so on.
+        (WHOLE, 10, MEANS),
+        (WHOLE.replace("(0.4)", "(0.6)"), 10, [18.2 / 3, 16.1 / 3, 20 / 3]),
+        (WHOLE.replace("recent 1", "recent 2"), 10, [19.9 / 3, 17.3 / 3, 21.7 / 3]),
+        (FREE, 6, [4.975, 5.425, 6.95]),
         # .55 times the mean and .45 times (.5 + 1) / 2, (1 + 0) / 2, (-1 + 1) / 2.
-        (f"{WHOLE}; scatter over 60 (0.45)", 12, WITH_SCATTER),
-        # .8 times and .2 times the same.
+        (f"{WHOLE}; scatter over 60 (0.45)", 12, 0.55 * MEANS + 0.45 * SCATTERED),
+        (f"{WHOLE}; scatter over 60 (0.3)", 12, 0.7 * MEANS + 0.3 * SCATTERED),
         (
-            f"{WHOLE}; scatter over 20 (0.2)",
-            12,
-            [16.88 / 3 + 0.15, 12.16 / 3 + 0.64 + 0.1, 13.28 / 3 + 1.6],
+            f"{FREE}; scatter over 60 (0.3)",
+            7,
+            [0.7 * 4.975 + 0.3, 0.7 * 5.425, 0.7 * 6.95 + 0.3],
         ),
         # Both are held against the mean where all are on one scale (see test_development).
+        (f"{WHOLE}; noise 0.3, shift 0.5", 14, MEANS),
         (
-            f"{WHOLE}; or noise of one sensor, 0.3, or its shift, 0.5",
-            14,
-            [21.1 / 3, 15.2 / 3 + 0.8, 16.6 / 3 + 2.0],
+            f"{WHOLE}; scatter over 60 (0.45); noise 0.75, shift 1",
+            16,
+            0.55 * MEANS + 0.45 * SCATTERED,
         ),
-        (f"{WHOLE}; scatter over 60 (0.45){QUIETEST}", 16, WITH_SCATTER),
     ],
 )
 def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
@@ -185,19 +193,24 @@ def test_statistics_are_put_together_as_the_name_says(name, parts, expected):
         REBUILT: np.array([2.0, 2.0, 9.0]),
         RECENT: np.full(3, 10.0),
         "T2 of limited mean over 20": np.array([1.0, 7.0, 2.0]),
+        "T2 of limited mean over 10": np.array([9.0, 6.0, 9.0]),
+        "size of one state over 5": np.array([12.0, 1.0, 1.0]),
+        "size of one state over 3": np.array([11.0, 9.0, 9.0]),
         "T2 of mean over 5": np.full(3, 5.0),
         "closed form's T2 of limited mean over 20": np.array([6.0, 1.0, 2.0]),
-        "closed form's size of one state over 3": np.array([3.0, 8.0, 8.0]),
+        "closed form's T2 of limited mean over 10": np.array([5.0, 9.0, 9.0]),
+        "closed form's size of one state over 5": np.array([3.0, 8.0, 8.0]),
+        "closed form's size of one state over 3": np.array([9.0, 7.0, 9.0]),
         "closed form's T2 of mean over 5": np.array([4.0, 32 / 3, 32 / 3]),
         "parity residuals' T2 of limited mean over 10": np.array([9.0, 2.0, 0.0]),
+        "parity residuals' T2 of limited mean over 5": np.array([7.0, 9.0, 9.0]),
         "parity residuals' size of one state over 10": np.array([3.0, 4.0, 10.0]),
+        "parity residuals' size of one state over 5": np.array([9.0, 9.0, 8.0]),
         "parity residuals' T2 of mean over 1": np.array([1.0, 0.0, 0.0]),
-        "size of one state over 3": np.array([12.0, 1.0, 1.0]),
+        "parity residuals' T2 of mean over 2": np.array([2.0, 1.0, 0.0]),
         "size of one state over 10": np.array([4.0, 1.0, 1.0]),
         "size of one state over 60": np.array([0.5, 2.0, -1.0]),
         "closed form's size of one state over 60": np.array([4.0, 0.0, 1.0]),
-        "size of one state over 20": np.array([0.5, 2.0, -1.0]),
-        "closed form's size of one state over 20": np.array([4.0, 0.0, 1.0]),
     }
     one = next(one for one in candidates() if one.name == name)
     assert one.parts == parts
