@@ -1,7 +1,6 @@
 """Run one stage: parameters checked whole, only the declared ones handed over, all tracked."""
 
 import importlib
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,9 @@ from odisar.tracking.story import tell_story
 #: In the order of ``dvc.yaml``.
 STAGES = ("preprocess", "tune", "train", "calibrate", "evaluate", "bundle", "report", "publish")
 
-# NumPy's threads would compete with the processes that share the cores.
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 def run_stage(name: str, root: Path) -> None:
     """Run the stage ``name`` in the workspace ``root``."""
-    for variable in _ONE_THREAD:
-        os.environ.setdefault(variable, "1")
     config = load_config(root)
     stage = importlib.import_module(f"odisar.stages.{name}")
     view = ConfigView(config, stage.PARAMS)

@@ -1,7 +1,6 @@
 """Run one part of the study."""
 
 import importlib
-import os
 from pathlib import Path
 
 from odisar.artifacts import Workspace
@@ -23,17 +22,12 @@ PARTS = (
 #: Those that are run once for each set-up.
 OF_ONE_SETUP = ("alternatives", "confidence", "forecasting", "seeds")
 
-# NumPy's threads would compete with the processes that share the cores.
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 def run_part(name: str, setup: str | None, root: Path) -> None:
     """Run the part ``name`` in the workspace ``root``, for one set-up or for all.
 
     Raises OdisarError for an unknown part or set-up, or where the pipeline hasn't run yet.
     """
-    for variable in _ONE_THREAD:
-        os.environ.setdefault(variable, "1")
     use_one_thread()
     if name not in PARTS:
         raise OdisarError(f"the study has no part {name!r}; parts are {', '.join(PARTS)}")

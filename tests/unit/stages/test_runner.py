@@ -12,8 +12,6 @@ from odisar.stages.runner import run_stage
 def workspace(tmp_path, request, monkeypatch):
     """Parameters, pipeline and a line of code, without any recording."""
     monkeypatch.delenv("ODISAR_TRACKING_ROOT", raising=False)
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        monkeypatch.setenv(variable, "1")  # the runner sets them; this puts them back afterwards
     for name in ("params.yaml", "dvc.yaml"):
         shutil.copyfile(request.config.rootpath / name, tmp_path / name)
     (tmp_path / "src").mkdir()

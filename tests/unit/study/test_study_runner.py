@@ -10,15 +10,6 @@ from odisar.errors import OdisarError
 from odisar.study import runner
 from odisar.study.runner import PARTS, run_part
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-@pytest.fixture(autouse=True)
-def _threads(monkeypatch):
-    # The runner sets them for its own process and those it starts.
-    for name in THREADS:
-        monkeypatch.setenv(name, "1")
-
 
 @pytest.fixture(scope="module")
 def config(request):
