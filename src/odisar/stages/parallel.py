@@ -1,8 +1,10 @@
 """Run the members of a stage side by side, one process and one torch thread each."""
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import TypeVar
 
 from tqdm import tqdm
@@ -27,10 +29,27 @@ def run_jobs(function: Callable[[Job], Result], jobs: Sequence[Job], workers: in
     """
     if min(workers, len(jobs)) <= 1:
         return [function(job) for job in jobs]
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("spawn")) as pool:
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _end_with_parent) as pool:
         futures = [pool.submit(function, job) for job in jobs]
         try:
             return [future.result() for future in futures]
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as the one that started it is gone, killed or not.
+
+    A pool's processes don't notice by themselves: they would finish their job for nobody, and then
+    wait for another for ever.
+    """
+    parent = parent_process()
+    if parent is not None:
+        Thread(target=_exit_after, args=(parent.join,), daemon=True).start()
+
+
+def _exit_after(wait: Callable[[], None]) -> None:
+    wait()
+    os._exit(1)

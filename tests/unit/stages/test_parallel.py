@@ -1,5 +1,9 @@
 import os
+import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -34,3 +38,46 @@ def test_a_failure_comes_out_as_it_was_raised(workers):
 
 def test_a_single_job_starts_no_process():
     assert run_jobs(slow_square, [3], 8) == [(9, os.getpid())]
+
+
+def tell_process_and_sleep(path: Path) -> None:
+    path.write_text(str(os.getpid()))
+    time.sleep(120)
+
+
+STARTED = """
+import sys
+from pathlib import Path
+from test_parallel import tell_process_and_sleep
+from odisar.stages.parallel import run_jobs
+if __name__ == "__main__":
+    run_jobs(tell_process_and_sleep, [Path(name) for name in sys.argv[1:]], 2)
+"""
+
+
+def is_running(process: int) -> bool:
+    # A zombie has ended: nobody has asked for its exit code yet.
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks /proc for processes")
+def test_whoever_is_killed_leaves_no_process_behind(tmp_path):
+    script, paths = tmp_path / "started.py", [tmp_path / "one", tmp_path / "two"]
+    script.write_text(STARTED)
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    command = [sys.executable, script, *paths]
+    parent = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": path})
+    deadline = time.monotonic() + 60
+    while not all(p.exists() and p.read_text() for p in paths):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    workers = [int(path.read_text()) for path in paths]
+    assert all(map(is_running, workers))
+    parent.send_signal(signal.SIGKILL)
+    parent.wait(timeout=10)
+    while any(map(is_running, workers)):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
