@@ -17,9 +17,11 @@ from odisar.artifacts import Workspace, read_json
 from odisar.capability.assessment import assessment_schema
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.scoring import DETECTORS, Scorer
+from odisar.config.loader import ConfigView, load_config
 from odisar.recordings.schema import Recording
 from odisar.recordings.store import read_store
 from odisar.stages.runner import STAGES
+from odisar.study import confirmation
 from odisar.twin.bundle import read_twin
 from odisar.windows.scaling import channel_std
 
@@ -128,6 +130,18 @@ def test_the_trained_twin_is_causal(workspace, setup):
         upto = slice(0, place + 1)
         np.testing.assert_array_equal(before[detector][upto], unmoved[detector][upto])
         assert abs(moved[detector][place] - before[detector][place]) > 1e-5
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+def test_a_second_draw_is_scored_as_test_recordings_are(workspace, setup, monkeypatch):
+    view = ConfigView(load_config(workspace.root), confirmation.PARAMS)
+    test = [r for r in read_store(workspace.recordings(CASES[setup])) if r.info.split == "test"]
+    monkeypatch.setattr(confirmation, "second_draw", lambda *_: iter(test))
+    confirmation.run(view, workspace, setup)
+    table = pd.read_csv(workspace.study_results / f"confirmation-{setup}.csv")
+    assert len(table) > 100
+    assert set(table.protocol) == {"P2"}
+    np.testing.assert_array_equal(table.value, table.on_test)
 
 
 def test_one_finished_parent_holds_the_whole_result(client):

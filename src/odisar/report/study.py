@@ -77,6 +77,13 @@ STUDY_TABLES = (
         "level takes the one with the highest F1; those that cannot be chosen have no rank.",
     ),
     StudyTable("development-cells", "the same, cell by cell, of the first and of what ships"),
+    StudyTable(
+        "confirmation",
+        "another draw of the test recordings",
+        "Simulated anew when everything was settled and scored once: what the monitor has there, "
+        "and what it has on the test recordings.",
+        (("evaluated_on", OVERALL), ("detector", MONITOR)),
+    ),
     StudyTable("dropout", "dropout rates and numbers of draws"),
     StudyTable("leakage", "leakage probes of the study's detectors"),
 )

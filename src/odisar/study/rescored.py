@@ -36,13 +36,13 @@ def read_scored(
     by_name = {item.name: item for item in data.splits["test"]}
     detectors = [name for name in table.columns if name not in ("recording", "time_s")]
     return [
-        _scored(config, by_name[str(name)], data, limits, part["time_s"].to_numpy(),
+        scored_recording(config, by_name[str(name)], data, limits, part["time_s"].to_numpy(),
                 {d: part[d].to_numpy() for d in detectors})
         for name, part in table.groupby("recording", sort=False)
     ]  # fmt: skip
 
 
-def _scored(
+def scored_recording(
     config: ConfigView,
     item: Recording,
     data: MemberData,
@@ -50,6 +50,7 @@ def _scored(
     time_s: NDArray[np.float64],
     scores: Mapping[str, Scores],
 ) -> ScoredRecording:
+    """Return a recording with what a set-up's detectors said of it at ``time_s``."""
     return ScoredRecording(
         name=item.name,
         info=item.info,

@@ -13,6 +13,7 @@ PARTS = (
     "alternatives",
     "comparing",
     "confidence",
+    "confirmation",
     "development",
     "forecasting",
     "leakage",
@@ -20,7 +21,7 @@ PARTS = (
 )
 
 #: Those that are run once for each set-up.
-OF_ONE_SETUP = ("alternatives", "confidence", "forecasting", "seeds")
+OF_ONE_SETUP = ("alternatives", "confidence", "confirmation", "forecasting", "seeds")
 
 
 def run_part(name: str, setup: str | None, root: Path) -> None:
