@@ -107,12 +107,12 @@ def _setup_rows(
     held_out = [(i, scorer.score(i, short_lead_steps=lead)) for i in data.splits["validation"]]
     makers = fit_statistics(data, scorer, held_out)
 
-    def seen(item: Recording, scores: RecordingScores) -> _Seen:
+    def seen(item: Recording, scores: RecordingScores) -> Seen:
         labels = label_active(item.time_s[scores.positions], item.intervals)
         made = {name: make(item, scores) for name, make in makers.items()}
-        return _Seen(made, labels, scores.runs)
+        return Seen(made, labels, scores.runs)
 
-    cells: dict[tuple[str, float], list[_Seen]] = {}
+    cells: dict[tuple[str, float], list[Seen]] = {}
     for item in data.splits["development"]:
         if item.info.is_disturbed:
             # On a ship the parts of the weather that are disturbed, on a robot the kind of fault.
@@ -121,7 +121,7 @@ def _setup_rows(
             found = seen(item, scorer.score(item, short_lead_steps=lead))
             cells.setdefault((kind, info.strength or 0.0), []).append(found)
     usual = [seen(*one) for one in held_out]
-    offered = [_Offered.fit(one, usual, sigmas) for one in candidates()]
+    offered = [Offered.fit(one, usual, sigmas) for one in candidates()]
     ours = shipped(data.case.score)
     return [
         {
@@ -141,7 +141,7 @@ def _setup_rows(
 
 
 @dataclass(frozen=True)
-class _Seen:
+class Seen:
     """A development recording: statistics and labels (time,), and its gapless runs."""
 
     statistics: Statistics
@@ -150,7 +150,7 @@ class _Seen:
 
 
 @dataclass(frozen=True)
-class _Offered:
+class Offered:
     """A candidate, what puts its mean on the scale of noise and shift, and its threshold.
 
     One without noise and shift beside needs no ``scale``.
@@ -161,7 +161,7 @@ class _Offered:
     threshold: float
 
     @classmethod
-    def fit(cls, one: Candidate, usual: Sequence[_Seen], sigmas: float) -> Self:
+    def fit(cls, one: Candidate, usual: Sequence[Seen], sigmas: float) -> Self:
         """Fit on held-out recordings; the threshold is mu + ``sigmas`` sigma."""
         scale = None
         if one.margins is not None:
@@ -171,7 +171,7 @@ class _Offered:
         said = np.concatenate([unset.said(seen) for seen in usual])
         return replace(unset, threshold=sigma_threshold(np.exp(said), sigmas))
 
-    def said(self, seen: _Seen) -> FloatArray:
+    def said(self, seen: Seen) -> FloatArray:
         """Return (time,) scores of a recording, on the log scale."""
         one, statistics = self.candidate, seen.statistics
         mean = one.of(statistics)
@@ -185,7 +185,7 @@ class _Offered:
         return np.concatenate([one.release.of(heard[start:stop]) for start, stop in seen.runs])
 
 
-def _judged(one: _Offered, members: list[_Seen], horizon_steps: int) -> dict[str, float]:
+def _judged(one: Offered, members: list[Seen], horizon_steps: int) -> dict[str, float]:
     # As in the pipeline's tables, time before a forecast error could be known is left out.
     logs = np.concatenate([one.said(seen)[horizon_steps:] for seen in members])
     labels = np.concatenate([seen.labels[horizon_steps:] for seen in members])

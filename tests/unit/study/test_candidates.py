@@ -55,7 +55,7 @@ def test_of_those_that_are_level_with_the_highest_the_first_has_the_highest_f1()
         ("highest", "x", 0.9, 0.8, 0.3),
         ("level", "x", 0.8995, 0.8, 0.5),
         ("as-level", "x", 0.8994, 0.8, 0.5),
-        ("below", "x", 0.898, 0.8, 0.9),
+        ("below", "x", 0.8988, 0.8, 0.9),
         ("lower", "x", 0.7, 0.8, 1.0),
         ("free", "x", 0.9004, 0.9, 1.0),
     ]
@@ -79,16 +79,20 @@ def test_what_cannot_be_chosen_is_compared_and_not_ranked():
 
 def test_cells_are_kept_of_the_first_of_what_ships_and_of_the_best_beside_them():
     names = [f"c{number}" for number in range(7)] + ["low", "free", "other"]
-    rows = [(name, "x", 1 - 0.05 * at, 0.5, 0.5) for at, name in enumerate(names)] * 2
-    cells = judged(*rows)
+    rows = [(name, "x", 1 - 0.05 * at, 0.5, 0.5) for at, name in enumerate(names)]
+    rows += [(name, "y", 0.4 + 0.05 * at, 0.5, 0.5) for at, name in enumerate(names)]
+    cells = judged(*rows, *rows)
     cells.loc[cells.candidate == "other", "can_be_chosen"] = False
     kept = cells_of_first(cells, ranked(cells))
-    expected = ["c0", "c1", "c2", "c3", "c4", "low", "free"]
-    assert kept.candidate.tolist() == [name for name in expected for _ in range(2)]
-    assert kept["rank"].dropna().tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 8, 8]
-    assert kept.auroc.tolist() == pytest.approx(
-        [1 - 0.05 * names.index(name) for name in kept.candidate]
-    )
+    for setup, expected, ranks in (
+        ("x", ["c0", "c1", "c2", "c3", "c4", "low", "free"], [1, 2, 3, 4, 5, 8]),
+        ("y", ["low", "c6", "c5", "c4", "c3", "other"], [1, 2, 3, 4, 5]),
+    ):
+        own = kept[kept.setup == setup]
+        assert own.candidate.tolist() == [name for name in expected for _ in range(2)]
+        assert own["rank"].dropna().tolist() == [rank for rank in ranks for _ in range(2)]
+        origin = cells[cells.setup == setup].set_index("candidate").auroc
+        assert own.auroc.tolist() == [origin[name].iloc[0] for name in own.candidate]
 
 
 def test_only_what_uses_the_twin_and_has_noise_and_shift_beside_can_be_chosen():

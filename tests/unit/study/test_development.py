@@ -171,6 +171,18 @@ def steps_of(one, scale, scores, statistics) -> list[np.ndarray]:
     return [*found, found[2]]
 
 
+def test_the_candidate_that_ships_is_marked(data, trained_twin, tmp_path, monkeypatch):
+    config = prepare(monkeypatch, data, trained_twin)
+    (name, *_), case = [one.name for one in chosen() if one.can_be_chosen], data.case.score
+    asked = []
+    monkeypatch.setattr(development, "shipped", lambda score: asked.append(score) or name)
+    development.run(config, Workspace(tmp_path))
+    for table in ("development", "development-cells"):
+        rows = pd.read_csv(tmp_path / f"reports/study/{table}.csv")
+        assert set(rows[rows.ships].candidate) == {name}
+    assert asked == [case]
+
+
 def test_noise_and_shift_less_their_margins_count_where_they_are_rarer_than_the_mean(
     cells, data, scorer, makers
 ):
