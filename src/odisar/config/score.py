@@ -21,7 +21,8 @@ class StatisticsConfig(Section):
 
     ``mean_steps``, ``size_steps`` and ``recent_steps`` are samples: of T2 of the mean, of the size
     of the state that scatters most, and of T2 of very few, which lets go as soon as a disturbance
-    has ended and has ``recent_share`` of the weight; the rest is that of the larger of the others.
+    has ended and has ``recent_share`` of the weight; the rest is that of the larger of the others,
+    which hardly count more than in the newer half of their windows.
     """
 
     mean_steps: PositiveInt

@@ -73,8 +73,9 @@ STUDY_TABLES = (
         "development",
         "scores on development recordings, by which the monitor's was chosen",
         "Development recordings are the only disturbed ones that anything was chosen by. The rule "
-        "goes by the mean of AUROC and TNR@TPR95 over the cells of a set-up, and of those that are "
-        "level takes the one with the highest F1; those that cannot be chosen have no rank.",
+        "goes by the mean of AUROC and TNR@TPR95 over the cells of a set-up, and of those within "
+        ".0005 of the highest takes the one with the highest F1; those that cannot be chosen have "
+        "no rank.",
     ),
     StudyTable("development-cells", "the same, cell by cell, of the first and of what ships"),
     StudyTable(

@@ -31,7 +31,7 @@ RELEASES = (Release(10, 0.5), Release(10, 1.0), Release(60, 1.0))
 #: Before the name of a statistic of the closed form's innovations, of parity residuals.
 CLOSED, PARITY = "closed form's ", "parity residuals' "
 #: The noise of one sensor, and its shift, as the monitor's score has them.
-NOISE, SHIFT = "noise of one sensor", "shift of one sensor"
+NOISE, SHIFT = "noise of one sensor", "shift of one state"
 
 #: (time,) statistics of one recording by name, on their log scale.
 Statistics = Mapping[str, FloatArray]
@@ -40,6 +40,8 @@ Statistics = Mapping[str, FloatArray]
 @dataclass(frozen=True)
 class Candidate:
     """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those.
+
+    Newer halves of windows aside.
 
     One that doesn't use the twin is there to be compared with, not to be chosen. With ``margins``
     it is that, or one sensor's noise or shift less its margin, whichever is rarest, and with a
@@ -59,8 +61,11 @@ class Candidate:
         return self.uses_twin and self.margins is not None
 
 
-def candidates() -> list[Candidate]:
-    """Return every candidate, in the order of the table."""
+def candidates(share_holding: float = 1.0) -> list[Candidate]:
+    """Return every candidate, in the order of the table.
+
+    Consistency counts by the share of states whose relation holds, as in the monitor's mean.
+    """
     singles = [f"T2 of mean over {k}" for k in WINDOWS]
     singles += [f"T2 of limited mean over {k}" for k in limited_steps()]
     singles += [f"T2 of exponential mean, weight {a:g}" for a in WEIGHTS]
@@ -80,21 +85,24 @@ def candidates() -> list[Candidate]:
         for steps in LIMITED
         for size in _FULL_SIZES
         for recent in RECENT
-        for one in _limited(steps, size, recent)
+        for one in _limited(steps, size, recent, share_holding)
     ]
 
 
-def shipped(score: ScoreConfig) -> str:
-    """Return the name of the candidate that a case's score is, if it is offered."""
+def shipped(score: ScoreConfig) -> str | None:
+    """Return the name of the candidate that a case's score is; None if none can be.
+
+    All of them hear a shift, and look back on as many parity residuals.
+    """
     made, tied, scatter = score.innovation, score.consistency, score.scatter
+    if score.shift is None or {tied.mean_steps, tied.size_steps} != {_TIED}:
+        return None
     name = f"mean over {made.mean_steps}, size over {made.size_steps}, reconstruction; "
     name += f"recent {made.recent_steps} ({made.recent_share:g}); closed form; "
     name += f"consistency, recent {tied.recent_steps} ({tied.recent_share:g})"
     if scatter.share:
         name += f"; scatter over {scatter.steps} ({scatter.share:g})"
-    name += f"; noise {score.noise.margin:g}"
-    if score.shift is not None:
-        name += f", shift {score.shift.margin:g}"
+    name += f"; noise {score.noise.margin:g}, shift {score.shift.margin:g}"
     if score.release.share:
         name += f"; release over {score.release.steps} ({score.release.share:g})"
     return name
@@ -131,7 +139,7 @@ def many_steps() -> list[int]:
     return sorted({steps for steps, _ in SCATTER})
 
 
-def _limited(steps: int, size: int, last: int) -> list[Candidate]:
+def _limited(steps: int, size: int, last: int, holding: float) -> list[Candidate]:
     """Return the largest of three, of a mean that single innovations can't rule.
 
     Alone, averaged with what the innovations of the closed form say, and with what parity residuals
@@ -148,9 +156,11 @@ def _limited(steps: int, size: int, last: int) -> list[Candidate]:
     for few, share in TIED_RECENT:
         tied = _tied(few, share)
         label = f"consistency, recent {few} ({share:g})"
-        whole = Candidate(f"{name}; closed form; {label}", 10, _mean(alone, closed, tied))
+        whole = Candidate(
+            f"{name}; closed form; {label}", 10, _mean((alone, 1.0), (closed, 1.0), (tied, holding))
+        )
         without = f"no twin: mean over {steps}, size over {size}; recent {last} (0.3); {label}"
-        free = Candidate(without, 6, _mean(closed, tied), uses_twin=False)
+        free = Candidate(without, 6, _mean((closed, 1.0), (tied, holding)), uses_twin=False)
         full, rest = [whole], [free]
         for many, part in SCATTER:
             added, sizes = f"; scatter over {many} ({part:g})", [f"size of one state over {many}"]
@@ -211,9 +221,14 @@ def _with_scatter(
     return of
 
 
-def _mean(*views: Callable[[Statistics], FloatArray]) -> Callable[[Statistics], FloatArray]:
+def _mean(
+    *weighed: tuple[Callable[[Statistics], FloatArray], float],
+) -> Callable[[Statistics], FloatArray]:
+    counted = [(view, weight) for view, weight in weighed if weight > 0]
+    whole = sum(weight for _, weight in counted)
+
     def of(s: Statistics) -> FloatArray:
-        return np.asarray(np.mean([view(s) for view in views], axis=0))
+        return np.asarray(sum(weight * view(s) for view, weight in counted) / whole)
 
     return of
 

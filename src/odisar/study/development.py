@@ -8,7 +8,7 @@ sensor's noise and shift beside: the ferry's development recordings hold weather
 a detector had better not listen to its sensors.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -30,6 +30,7 @@ from odisar.evaluation.metrics import (
     tnr_at_tpr95,
 )
 from odisar.recordings.schema import Recording
+from odisar.stages.detectors import fit_relations
 from odisar.stages.members import Member, MemberData, load_member
 from odisar.study.candidates import NOISE, SHIFT, Candidate, Statistics, candidates, shipped
 from odisar.study.fitted_statistics import fit_statistics
@@ -91,8 +92,9 @@ def _in_order(table: pd.DataFrame) -> pd.DataFrame:
 
 def cells_of_first(cells: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
     """Return the cells of a set-up's first candidates, of what ships, of the best beside them."""
-    unranked = table[table["rank"].isna()].sort_values("rule_mean", kind="stable").index
-    best = table.loc[unranked].groupby("setup").tail(1).index
+    unranked = table[table["rank"].isna()]
+    unranked = unranked.sort_values("rule_mean", ascending=False, kind="stable")
+    best = unranked.groupby("setup").head(1).index
     shown = table[(table["rank"] <= _FIRST) | table.ships | table.index.isin(best)]
     named = shown[["setup", "candidate", "rank"]]
     other = cells.drop(columns=["parts", "can_be_chosen"])
@@ -121,7 +123,9 @@ def _setup_rows(
             found = seen(item, scorer.score(item, short_lead_steps=lead))
             cells.setdefault((kind, info.strength or 0.0), []).append(found)
     usual = [seen(*one) for one in held_out]
-    offered = [Offered.fit(one, usual, sigmas) for one in candidates()]
+    relations = fit_relations(data, scorer.twin)
+    share = relations.share_holding(np.concatenate([scores.samples for _, scores in held_out]))
+    offered = [Offered.fit(one, usual, sigmas) for one in candidates(share)]
     ours = shipped(data.case.score)
     return [
         {
@@ -140,13 +144,23 @@ def _setup_rows(
     ]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Seen:
-    """A development recording: statistics and labels (time,), and its gapless runs."""
+    """A recording: statistics and labels (time,), and its gapless runs.
+
+    ``last`` holds the mean that was asked for last: many candidates in a row share one.
+    """
 
     statistics: Statistics
     labels: NDArray[np.bool_]
     runs: tuple[tuple[int, int], ...]
+    last: tuple[Callable[[Statistics], FloatArray], FloatArray] | None = None
+
+    def mean(self, one: Candidate) -> FloatArray:
+        """Return (time,) what a candidate makes of the statistics."""
+        if self.last is None or self.last[0] is not one.of:
+            self.last = (one.of, one.of(self.statistics))
+        return self.last[1]
 
 
 @dataclass(frozen=True)
@@ -165,7 +179,7 @@ class Offered:
         """Fit on held-out recordings; the threshold is mu + ``sigmas`` sigma."""
         scale = None
         if one.margins is not None:
-            means = np.concatenate([one.of(seen.statistics) for seen in usual])
+            means = np.concatenate([seen.mean(one) for seen in usual])
             scale = LogScale.fit(np.exp(means))
         unset = cls(one, scale, np.inf)
         said = np.concatenate([unset.said(seen) for seen in usual])
@@ -174,7 +188,7 @@ class Offered:
     def said(self, seen: Seen) -> FloatArray:
         """Return (time,) scores of a recording, on the log scale."""
         one, statistics = self.candidate, seen.statistics
-        mean = one.of(statistics)
+        mean = seen.mean(one)
         if self.scale is None or one.margins is None:
             return mean
         noise, shift = statistics[NOISE] - one.margins[0], statistics[SHIFT] - one.margins[1]

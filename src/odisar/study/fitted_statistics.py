@@ -58,7 +58,7 @@ def fit_statistics(data: MemberData, scorer: Scorer, held_out: HeldOut) -> dict[
     for name, statistic in _limited_statistics(closed).items():
         raw[f"{CLOSED}{name}"] = _along(statistic, lambda s: s.closed_form_innovations)
     relations = fit_relations(data, scorer.twin)
-    residuals = [relations.residuals(s.samples[a + 1 : b]) for _, s in held_out for a, b in s.runs]
+    residuals = [relations.residuals(s.samples[a:b]) for _, s in held_out for a, b in s.runs]
     for name, statistic in _limited_statistics(residuals).items():
         raw[f"{PARITY}{name}"] = _along(statistic, lambda s: relations.residuals(s.samples))
     by_regime = regime_distance(data, held_out)

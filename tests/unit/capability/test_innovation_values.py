@@ -74,6 +74,12 @@ def test_the_number_of_states_is_that_of_every_covariance(content):
         assert InnovationScoreValues.model_validate(other).states == {1, 2}
 
 
+@pytest.mark.parametrize("key", ["mean", "newer_mean"])
+def test_a_limit_is_a_covariance_too(content, key):
+    content["closed_form"][key]["limit"]["precision"] = [[1.0]]
+    assert InnovationScoreValues.model_validate(content).states == {1, 2}
+
+
 def test_without_a_reconstruction_the_mapping_says_null(content):
     assert content["closed_form"]["reconstruction"] is None
     assert set(content["twin"]["reconstruction"]) == {"usual", "rare"}
