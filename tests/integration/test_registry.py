@@ -291,7 +291,8 @@ print(sorted(heavy))
     code, said, heavy = done.stdout.strip().splitlines()[-3:]
     assert Path(code).is_relative_to(stored(client) / "code")
     wanted = read_bundle(bundle).assess(table_of(pushed()))
+    # Scores are in single precision, and libraries may have other numbers of threads there.
     pd.testing.assert_frame_equal(
-        pd.DataFrame(json.loads(said)), wanted, check_exact=False, rtol=1e-9
+        pd.DataFrame(json.loads(said)), wanted, check_exact=False, rtol=1e-6
     )
     assert heavy == "[]"
