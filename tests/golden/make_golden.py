@@ -169,7 +169,7 @@ def analytic_scores() -> InnovationScores:
         scatter=None,
     )
     steps = NoiseSteps(lasting=3, recent=2, recent_share=0.5, margin=0.1)
-    noise = SensorNoise(steps, LogScale(-0.5, 0.3), LogScale(-0.6, 0.4))
+    noise = SensorNoise(steps, LogScale(-0.5, 0.3), LogScale(-0.55, 0.35), LogScale(-0.6, 0.4))
     scales = {
         ODISAR: LogScale(-0.3, 1.2),
         WITHOUT_TRANSFORMER: LogScale(-0.4, 1.3),

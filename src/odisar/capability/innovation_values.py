@@ -12,7 +12,6 @@ from odisar.capability.outliers import NoiseSteps, SensorNoise
 from odisar.capability.release import Release
 from odisar.capability.shifts import ShiftSteps, StateShift
 from odisar.capability.statistic_values import (
-    NUMBER_LIMIT,
     Covariant,
     InnovationValues,
     Number,
@@ -22,7 +21,7 @@ from odisar.capability.statistic_values import (
     statistic_values,
 )
 from odisar.config.base import PositiveInt, Section
-from odisar.config.score import LONGEST_MEMORY
+from odisar.config.score import LONGEST_MEMORY, Margin
 
 
 class RelationValues(Section):
@@ -68,7 +67,7 @@ class NoiseStepsValues(Section):
     lasting: PositiveInt
     recent: PositiveInt
     recent_share: Annotated[float, Field(ge=0, lt=1)]
-    margin: Annotated[float, Field(ge=0, le=NUMBER_LIMIT)]
+    margin: Margin
 
 
 class NoiseValues(Section):
@@ -76,6 +75,7 @@ class NoiseValues(Section):
 
     steps: NoiseStepsValues
     lasting: ScaleValues
+    newer: ScaleValues
     recent: ScaleValues
 
     @classmethod
@@ -84,6 +84,7 @@ class NoiseValues(Section):
         return cls(
             steps=NoiseStepsValues(**vars(noise.steps)),
             lasting=ScaleValues(**vars(noise.lasting)),
+            newer=ScaleValues(**vars(noise.newer)),
             recent=ScaleValues(**vars(noise.recent)),
         )
 
@@ -92,6 +93,7 @@ class NoiseValues(Section):
         return SensorNoise(
             NoiseSteps(**self.steps.model_dump()),
             LogScale(**self.lasting.model_dump()),
+            LogScale(**self.newer.model_dump()),
             LogScale(**self.recent.model_dump()),
         )
 
@@ -100,7 +102,7 @@ class ShiftStepsValues(Section):
     """How far back a shift of one state is sought, and its margin."""
 
     memory: Annotated[int, Field(ge=1, le=LONGEST_MEMORY)]
-    margin: Annotated[float, Field(ge=0, le=NUMBER_LIMIT)]
+    margin: Margin
 
 
 class ShiftValues(Section):

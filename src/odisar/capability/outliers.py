@@ -14,7 +14,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from odisar.capability.innovations import FloatArray, LogScale, moving_mean
+from odisar.capability.innovations import (
+    FloatArray,
+    LogScale,
+    held_to_newer,
+    moving_mean,
+    newer_half,
+)
 from odisar.capability.responses import StepResponse, state_directions
 from odisar.recordings.schema import Recording
 from odisar.twin.bundle import TrainedTwin
@@ -85,7 +91,8 @@ class NoiseSteps:
     """How the score of noise is put together (``score.noise`` of a case in params.yaml).
 
     ``lasting`` and ``recent`` are numbers of samples, ``recent_share`` the weight of the latter;
-    ``margin`` is how much further out than elsewhere it must be, on the common log scale.
+    ``margin`` is how much further out than elsewhere it must be, on the common log scale; below
+    zero, how much less far.
     """
 
     lasting: int
@@ -96,10 +103,15 @@ class NoiseSteps:
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """How noisy the noisiest state is: on the common log scale, less a margin."""
+    """How noisy the noisiest state is: on the common log scale, less a margin.
+
+    What lasts counts hardly more than in the ``newer`` half of its window: noise that only the
+    older half holds is over.
+    """
 
     steps: NoiseSteps
     lasting: LogScale
+    newer: LogScale
     recent: LogScale
 
     @property
@@ -110,16 +122,18 @@ class SensorNoise:
     @classmethod
     def fit(cls, runs: Sequence[FloatArray], steps: NoiseSteps) -> Self:
         """Fit on gapless runs (time, state) of squares of held-out recordings."""
-        lasting, recent = (
+        scales = (
             LogScale.fit(np.concatenate([_noisiest(run, count) for run in runs]))
-            for count in (steps.lasting, steps.recent)
+            for count in (steps.lasting, newer_half(steps.lasting), steps.recent)
         )
-        return cls(steps, lasting, recent)
+        return cls(steps, *scales)
 
     def score(self, squares: FloatArray) -> FloatArray:
         """Return (time,) along one gapless run of squares (time, state); NaN until it is known."""
         steps = self.steps
-        lasting = self.lasting.of(_noisiest(squares, steps.lasting))
+        whole = self.lasting.of(_noisiest(squares, steps.lasting))
+        newer = self.newer.of(_noisiest(squares, newer_half(steps.lasting)))
+        lasting = held_to_newer(whole, newer)
         recent = self.recent.of(_noisiest(squares, steps.recent))
         mixed = (1 - steps.recent_share) * lasting + steps.recent_share * recent
         return np.asarray(mixed - steps.margin)

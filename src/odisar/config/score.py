@@ -4,13 +4,16 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from odisar.config.base import NonNegativeFloat, PositiveInt, Section
+from odisar.config.base import PositiveInt, Section
 
 #: What is usual and rare on held-out recordings isn't known from fewer scores.
 FEWEST_KNOWN = 20
 
 #: Computing time and storage grow with the memory for shifts.
 LONGEST_MEMORY = 1000
+
+#: How much further out than elsewhere something must be to be heard, on the common log scale.
+Margin = Annotated[float, Field(ge=-1, le=100)]
 
 _Weight = Annotated[float, Field(ge=0, lt=1)]
 _Share = Annotated[float, Field(ge=0, le=1)]
@@ -45,14 +48,15 @@ class NoiseConfig(Section):
     """How far back the noise of one sensor looks, and how rare it must be.
 
     ``lasting_steps`` and ``recent_steps`` are samples, the latter with ``recent_share`` of the
-    weight. ``margin`` is taken off: 0 lets noise count as soon as it is as rare as anything else
-    must be, 1 only where it is about twice as far out.
+    weight; what lasts counts hardly more than in the newer half of its window. ``margin`` is taken
+    off: 0 lets noise count as soon as it is as rare as anything else must be, 1 only where it is
+    about twice as far out; below 0 it counts sooner than anything else.
     """
 
     lasting_steps: PositiveInt
     recent_steps: PositiveInt
     recent_share: _Weight
-    margin: NonNegativeFloat
+    margin: Margin
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -72,7 +76,7 @@ class ShiftConfig(Section):
     """
 
     memory_steps: Annotated[int, Field(ge=1, le=LONGEST_MEMORY)]
-    margin: NonNegativeFloat
+    margin: Margin
 
 
 class ReleaseConfig(Section):

@@ -20,7 +20,7 @@ MANIFEST_FILE = "manifest.json"
 #: 5: it lets go of something strong that is over.
 #: 6: it seeks the shift of one state.
 #: 7: it holds statistics to the newer half of their windows.
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 #: No manifest is longer, no other JSON, and no file of a bundle at all: bytes.
 MANIFEST_LIMIT = 1_000_000
 CONTENT_LIMIT = 16_000_000

@@ -25,11 +25,11 @@ def noise() -> SensorNoise:
     return SensorNoise.fit([squares("a"), squares("b", 700)], STEPS)
 
 
-@pytest.mark.parametrize("margin", [0.0, 0.25])
+@pytest.mark.parametrize("margin", [-0.25, 0.0, 0.25])
 def test_what_is_usual_is_at_zero_and_what_is_rare_at_one_less_the_margin(margin):
     run = squares("a")
-    for window in (1, 8):
-        steps = NoiseSteps(lasting=window, recent=1, recent_share=0.0, margin=margin)
+    for window, share in ((1, 0.0), (1, 0.5)):
+        steps = NoiseSteps(lasting=window, recent=1, recent_share=share, margin=margin)
         found = SensorNoise.fit([run], steps).score(run)
         known = found[np.isfinite(found)]
         wanted = [-margin, 1 - margin]
@@ -53,8 +53,21 @@ def test_both_windows_are_mixed_by_their_shares_and_each_has_its_own_scale(noise
 
     found = noise.score(fresh)
     for at in (9, 30, 59):
-        wanted = 0.6 * on_its_scale(8, at) + 0.4 * on_its_scale(3, at) - 0.25
+        lasting = min(on_its_scale(8, at), on_its_scale(4, at) + 0.5)
+        wanted = 0.6 * lasting + 0.4 * on_its_scale(3, at) - 0.25
         assert found[at] == pytest.approx(wanted)
+
+
+def test_noise_that_only_the_older_half_of_its_window_holds_is_over(noise):
+    run = squares("fresh", 60)
+    run[40:] = 0.1
+    run[20:40] = 30.0
+    unmixed = replace(noise, steps=replace(STEPS, recent_share=0.0, margin=0.0))
+    means = np.array([np.log1p(run[i - 7 : i + 1]).mean() for i in range(43, 45)])
+    # The window still holds noise where its newer half no longer does.
+    assert noise.lasting.of(means).min() > 1
+    assert unmixed.score(run)[43:45].max() < 0
+    assert unmixed.score(run)[39] > 2
 
 
 @pytest.mark.parametrize("state", [0, 1, 2])

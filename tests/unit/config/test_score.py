@@ -18,7 +18,7 @@ def score():
 @pytest.mark.parametrize(
     ("part", "key", "value"),
     [
-        ("noise", "margin", -0.1),
+        ("noise", "margin", -1.1),
         ("noise", "lasting_steps", 0),
         ("noise", "recent_steps", 0),
         ("noise", "recent_share", 1.0),
@@ -27,7 +27,7 @@ def score():
         ("scatter", "share", 1.0),
         ("shift", "memory_steps", 0),
         ("shift", "memory_steps", 1001),
-        ("shift", "margin", -0.1),
+        ("shift", "margin", -1.1),
         ("release", "steps", 0),
         ("release", "share", 1.1),
         ("release", "share", -0.1),
