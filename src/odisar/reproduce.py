@@ -10,7 +10,7 @@ from odisar.config.loader import load_config
 from odisar.errors import OdisarError
 from odisar.making import make_recordings, run_dvc, track_recordings
 from odisar.report.headline import headline_text
-from odisar.stages.publish import ensure_published
+from odisar.stages.published import ensure_published
 from odisar.tracking import ROOT_VARIABLE, initialise_store, tracking_root
 from odisar.tracking.registry import model_name
 

@@ -44,8 +44,8 @@ class ShiftSteps:
 
     ``memory`` is among how many samples, the last ones, its onset or its end is sought, and how
     long one that has ended may have lasted; ``margin`` is how much further out than elsewhere it
-    must be, on the common log scale (below zero, how much less far). The end of one that has lasted longer, and left no trace
-    since, is taken for the onset of another.
+    must be, on the common log scale; below zero, how much less far. The end of one that has lasted
+    longer, and left no trace since, is taken for the onset of another.
     """
 
     memory: int

@@ -19,8 +19,8 @@ from odisar.report.figures.pairs import pairs_of
 from odisar.report.figures.reliability import ALL_STATES, DISTRIBUTION_NAMES
 from odisar.report.gains import signed
 from odisar.report.load import Results, rows_of
+from odisar.report.names import METRIC_NAMES, SHARES, strength_name
 from odisar.report.picking import same_strength, shown_detectors
-from odisar.report.style import METRIC_NAMES, SHARES, strength_name
 from odisar.report.tables import Table, metric_cell, number, published_beside
 
 _COVERAGES = ("0.5", "0.8", "0.9", "0.95")

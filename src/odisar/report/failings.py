@@ -8,8 +8,8 @@ from odisar.report.detectors import MONITOR, ORACLE, detector_name
 from odisar.report.figures.pairs import pairs_of
 from odisar.report.gains import HARMS, by_metric, is_worse, metrics_at, verdict
 from odisar.report.load import OVERALL, Results, rows_of
+from odisar.report.names import METRIC_NAMES
 from odisar.report.picking import Value, at_strength, percent, pick, same_strength
-from odisar.report.style import METRIC_NAMES
 
 #: AUROC below which a strength is called hard to see: every fifth pair of a disturbed and an
 #: undisturbed moment is then ranked the wrong way round.

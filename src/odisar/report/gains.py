@@ -8,7 +8,7 @@ import pandas as pd
 from odisar.report.detectors import RECONSTRUCTION, WITHOUT_TRANSFORMER, detector_name
 from odisar.report.figures.pairs import pairs_of
 from odisar.report.load import Results, rows_of
-from odisar.report.style import METRIC_NAMES, SHARES, strength_name
+from odisar.report.names import METRIC_NAMES, SHARES, strength_name
 
 #: Of these, less is better.
 _LESS_IS_BETTER = ("delay_p50_s",)

@@ -13,8 +13,8 @@ from odisar.evaluation.cells import OVERALL, clean_cells, metadata_columns
 from odisar.evaluation.scored import ScoredRecording
 from odisar.recordings.schema import Interval, RecordingInfo
 from odisar.report.load import Results, rows_of
+from odisar.report.names import strength_name
 from odisar.report.ordering import ordered_values
-from odisar.report.style import strength_name
 
 
 @dataclass(frozen=True)

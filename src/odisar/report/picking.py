@@ -6,7 +6,7 @@ import pandas as pd
 
 from odisar.report.detectors import TWIN_SCORES, alternatives
 from odisar.report.load import OVERALL, Results
-from odisar.report.style import strength_name
+from odisar.report.names import strength_name
 
 #: More rows than these do not fit on a page.
 _DRAWN_SCENARIOS = 36

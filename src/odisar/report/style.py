@@ -8,7 +8,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 import seaborn as sns
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -20,12 +19,6 @@ from PIL import Image
 
 #: Most abnormal last: the order in which shares are stacked.
 QUADRANTS = ("green", "yellow", "orange", "red")
-QUADRANT_NAMES = {
-    "green": "IND, confident",
-    "yellow": "IND, uncertain",
-    "orange": "OOD, uncertain",
-    "red": "OOD, confident",
-}
 #: The paper's colours, in shades of different lightness; the hatches serve print and eyes that
 #: do not tell red from green.
 QUADRANT_COLOURS = {
@@ -35,21 +28,6 @@ QUADRANT_COLOURS = {
     "red": "#a3142a",
 }
 QUADRANT_HATCHES = {"green": "", "yellow": "....", "orange": "////", "red": "xxxx"}
-
-METRIC_NAMES = {
-    "auroc": "AUROC",
-    "tnr_at_tpr95": "TNR@TPR95",
-    "f1_ind": "F1 IND",
-    "f1_ood": "F1 OOD",
-    "events_detected": "events detected",
-    "false_alarms_per_hour": "false alarms per hour",
-    "delay_p50_s": "delay p50 [s]",
-    "delay_p90_s": "delay p90 [s]",
-    "lead_time_p50_s": "lead time p50 [s]",
-    "vus_pr": "VUS-PR",
-}
-#: Metrics that are shares, shown in percent.
-SHARES = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood", "events_detected", "vus_pr")
 
 #: Shade of the time in which a disturbance is active.
 EVENT_COLOUR = "#b8c4d6"
@@ -156,13 +134,3 @@ def plain_logarithm(axis: Axis) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
-
-
-def strength_name(strength: float) -> str:
-    """Return a strength for an axis; recordings without one are simply all of them."""
-    return "all" if pd.isna(strength) else f"{strength:g}"
-
-
-def with_strength(scenario: str, strength: float) -> str:
-    """Return a scenario's name with its strength, if it has one, for an axis."""
-    return scenario if pd.isna(strength) else f"{scenario}, {strength_name(strength)}"

@@ -10,8 +10,8 @@ from odisar.report.detectors import MONITOR, ORACLE
 from odisar.report.failings import failings
 from odisar.report.gains import monitor_gain, transformer_gain
 from odisar.report.load import Results
+from odisar.report.names import METRIC_NAMES
 from odisar.report.picking import at_strength, percent, pick, selection
-from odisar.report.style import METRIC_NAMES
 
 #: What every twin does, whatever the case.
 _METHOD = (

@@ -10,8 +10,8 @@ import pandas as pd
 from odisar.report.detectors import ORACLE, detector_name
 from odisar.report.headline import headline_table
 from odisar.report.load import OVERALL, Results, rows_of
+from odisar.report.names import METRIC_NAMES, QUADRANT_NAMES, SHARES, strength_name
 from odisar.report.picking import lead_time_note, same_strength
-from odisar.report.style import METRIC_NAMES, QUADRANT_NAMES, SHARES, strength_name
 
 DETECTION_METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
 EVENT_METRICS = ("events_detected", "delay_p50_s", "delay_p90_s", "lead_time_p50_s")

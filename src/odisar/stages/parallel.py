@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
+from multiprocessing import forkserver, get_all_start_methods, get_context, parent_process
 from threading import Thread
 from typing import TypeVar
 
@@ -11,6 +11,20 @@ from tqdm import tqdm
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
+
+#: Processes are copies of a server that has imported everything and done nothing, where the system
+#: can do that; elsewhere each imports for itself.
+_START = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+
+
+def prepare_jobs(module: str, workers: int) -> None:
+    """Let the server of ``run_jobs`` import a module, while this process goes on.
+
+    Imports of the libraries take seconds: so they are done once, beside this process's own.
+    """
+    if workers > 1 and _START == "forkserver":
+        get_context(_START).set_forkserver_preload([module])
+        forkserver.ensure_running()
 
 
 def show_progress(items: Sequence[Job], name: str, position: int) -> Iterable[Job]:
@@ -24,13 +38,14 @@ def run_jobs(function: Callable[[Job], Result], jobs: Sequence[Job], workers: in
 
     After a failure no further job is begun; those that run are waited for.
 
-    With one worker or one job everything stays in this process: starting another costs seconds
-    of imports. ``function`` must be a module's top-level function.
+    With one worker or one job everything stays in this process: starting another costs time, if
+    ``prepare_jobs`` wasn't called seconds of imports. ``function`` must be a module's top-level
+    function.
     """
     if min(workers, len(jobs)) <= 1:
         return [function(job) for job in jobs]
-    spawn = get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _end_with_parent) as pool:
+    start = get_context(_START)
+    with ProcessPoolExecutor(min(workers, len(jobs)), start, _end_with_parent) as pool:
         futures = [pool.submit(function, job) for job in jobs]
         try:
             return [future.result() for future in futures]

@@ -6,21 +6,19 @@ what it is made from is.
 
 from datetime import datetime
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from odisar.artifacts import Workspace, read_json, read_table, write_json
-from odisar.config.loader import ConfigView, load_config
+from odisar.config.loader import ConfigView
 from odisar.deployment.development import DevelopmentScore
 from odisar.errors import OdisarError
 from odisar.report.headline import headline_table
 from odisar.report.load import report_folder, rows_of
-from odisar.report.page import RunFacts, page_content, render_page
+from odisar.report.page import RunFacts, render_page
 from odisar.report.simulator_checks import show_sea_trial
 from odisar.stages.bundle import measure_again
-from odisar.stages.runner import STAGES, plain_sections, run_stage
+from odisar.stages.runner import STAGES, plain_sections
 from odisar.tracking import (
-    FINISHED,
     PUBLISHED_TAG,
     TrackedRun,
     Tracker,
@@ -139,26 +137,6 @@ def run_facts(config: ConfigView, workspace: Workspace, tracker: Tracker) -> Run
         published_at=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         stages=[(name, _duration(seconds.get(name))) for name in STAGES if name != "publish"],
     )
-
-
-def ensure_published(root: Path) -> None:
-    """Publish again where DVC had no reason to, but page or parent run are not of this content.
-
-    DVC restores a stage that it has run before from its cache; the page, which is none of its
-    outputs, is then still that of the run in between.
-    """
-    config = load_config(root)
-    workspace = Workspace(root)
-    tracker = Tracker(root, config.tracking.experiment)
-    found = tracker.find_parent()
-    key = content_key(root)
-    is_complete = (
-        found is not None
-        and found.data.tags.get(PUBLISHED_TAG) == key
-        and found.info.status == FINISHED
-    )
-    if not is_complete or page_content(workspace.report) != key:
-        run_stage("publish", root)
 
 
 def configured(config: ConfigView) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import torch
 
 from odisar.artifacts import Workspace
 from odisar.config.loader import ConfigView
+from odisar.report.body import render_body
 from odisar.report.examples import (
     Tested,
     choose_examples,
@@ -20,7 +21,6 @@ from odisar.report.examples import (
 from odisar.report.gallery import draw_figures
 from odisar.report.load import Results, report_folder
 from odisar.report.notebooks import execute_notebooks
-from odisar.report.page import render_body
 from odisar.report.simulator_checks import check_simulator
 from odisar.stages.members import load_member, pipeline_members
 from odisar.tracking import TrackedRun

@@ -7,17 +7,23 @@ from typing import Any
 
 from odisar.artifacts import Workspace
 from odisar.config.loader import ConfigView, load_config
+from odisar.stages.parallel import prepare_jobs
 from odisar.tracking import Tracker
 from odisar.tracking.story import tell_story
 
 #: In the order of ``dvc.yaml``.
 STAGES = ("preprocess", "tune", "train", "calibrate", "evaluate", "bundle", "report", "publish")
+#: Those that run their members side by side.
+_OF_MEMBERS = ("tune", "train", "calibrate", "evaluate", "bundle")
 
 
 def run_stage(name: str, root: Path) -> None:
     """Run the stage ``name`` in the workspace ``root``."""
     config = load_config(root)
-    stage = importlib.import_module(f"odisar.stages.{name}")
+    module = f"odisar.stages.{name}"
+    if name in _OF_MEMBERS:
+        prepare_jobs(module, config.pipeline.workers)
+    stage = importlib.import_module(module)
     view = ConfigView(config, stage.PARAMS)
     workspace = Workspace(root)
     tracker = Tracker(root, config.tracking.experiment, tell_story(config, root))

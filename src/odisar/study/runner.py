@@ -6,6 +6,7 @@ from pathlib import Path
 from odisar.artifacts import Workspace
 from odisar.config.loader import ConfigView, load_config
 from odisar.errors import OdisarError
+from odisar.stages.parallel import prepare_jobs
 from odisar.twin.devices import use_one_thread
 
 #: Parts by the module that runs them.
@@ -20,6 +21,9 @@ PARTS = (
     "seeds",
 )
 
+#: Those that run several processes.
+_SIDE_BY_SIDE = ("alternatives", "confidence", "forecasting", "seeds")
+
 #: Those that are run once for each set-up.
 OF_ONE_SETUP = ("alternatives", "confidence", "confirmation", "forecasting", "seeds")
 
@@ -33,7 +37,10 @@ def run_part(name: str, setup: str | None, root: Path) -> None:
     if name not in PARTS:
         raise OdisarError(f"the study has no part {name!r}; parts are {', '.join(PARTS)}")
     config, workspace = load_config(root), Workspace(root)
-    part = importlib.import_module(f"odisar.study.{name}")
+    module = f"odisar.study.{name}"
+    if name in _SIDE_BY_SIDE:
+        prepare_jobs(module, config.pipeline.workers)
+    part = importlib.import_module(module)
     if setup is not None and setup not in config.study.setups:
         raise OdisarError(
             f"set-up {setup!r} is not among study.setups: {', '.join(config.study.setups)}"

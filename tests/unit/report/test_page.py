@@ -2,10 +2,12 @@ import re
 
 import pytest
 
+from odisar.report.body import render_body
 from odisar.report.figures.learning import tuning_trials
 from odisar.report.gallery import Drawn
 from odisar.report.load import SECTIONS
-from odisar.report.page import RunFacts, page_content, render_body, render_page
+from odisar.report.page import RunFacts, render_page
+from odisar.report.stamp import page_content
 from odisar.report.style import save_figure
 from odisar.stages import report as report_stage
 

@@ -8,7 +8,7 @@ from odisar.artifacts import read_json, write_json
 from odisar.config.loader import ConfigView, load_config
 from odisar.errors import OdisarError
 from odisar.report.load import report_folder
-from odisar.report.page import page_content
+from odisar.report.stamp import page_content
 from odisar.stages import publish
 from odisar.tracking import content_key
 from odisar.tracking.story import UNTOLD

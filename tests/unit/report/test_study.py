@@ -1,10 +1,10 @@
 import pytest
 
+from odisar.report.body import render_body
 from odisar.report.figures.baselines import has_study_networks
 from odisar.report.figures.forecasting import has_studied_forecasts, studied_error_by_step
 from odisar.report.figures.leakage import probed
 from odisar.report.load import study_folder
-from odisar.report.page import render_body
 from odisar.report.study import STUDY_TABLES, missing_study, seed_sentences, study_tables
 
 from .invented_comparisons import write_study

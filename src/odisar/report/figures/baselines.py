@@ -20,8 +20,9 @@ from odisar.report.detectors import (
     detector_name,
 )
 from odisar.report.load import OVERALL, Results
+from odisar.report.names import METRIC_NAMES, strength_name, with_strength
 from odisar.report.picking import drawn_scenarios, same_strength
-from odisar.report.style import METRIC_NAMES, figure_style, strength_name, with_strength
+from odisar.report.style import figure_style
 
 METRICS = ("auroc", "tnr_at_tpr95", "f1_ind", "f1_ood")
 _SHOWN = (*TWIN_SCORES, ORACLE)

@@ -15,6 +15,7 @@ from odisar.report.clock import Clock, clock, shade_events, trace_of
 from odisar.report.detectors import MONITOR
 from odisar.report.judged import judged_recording
 from odisar.report.load import Results, rows_of
+from odisar.report.names import with_strength
 from odisar.report.ordering import fault_key
 from odisar.report.picking import drawn_scenarios
 from odisar.report.style import (
@@ -24,7 +25,6 @@ from odisar.report.style import (
     channel_label,
     figure_style,
     row_inches,
-    with_strength,
 )
 
 #: Height of a state's row of blamed windows, with room for its name.

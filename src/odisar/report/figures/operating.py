@@ -7,8 +7,9 @@ from matplotlib.figure import Figure
 
 from odisar.report.detectors import detector_look, detector_name
 from odisar.report.load import OVERALL, Results, rows_of
+from odisar.report.names import strength_name
 from odisar.report.picking import shown_detectors
-from odisar.report.style import figure_style, strength_name
+from odisar.report.style import figure_style
 
 
 def operating_point(results: Results, setup: str) -> Figure:

@@ -13,8 +13,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from odisar.report.detectors import MONITOR, detector_name
 from odisar.report.load import OVERALL, Results
+from odisar.report.names import METRIC_NAMES, SHARES, strength_name
 from odisar.report.picking import same_strength
-from odisar.report.style import METRIC_NAMES, SHARES, figure_style, strength_name
+from odisar.report.style import figure_style
 
 #: Metrics of the table of pairs, with what a difference above zero means.
 _PANELS = {

@@ -11,16 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from odisar.report.load import Results
+from odisar.report.names import QUADRANT_NAMES, strength_name, with_strength
 from odisar.report.picking import drawn_scenarios
 from odisar.report.style import (
     QUADRANT_COLOURS,
     QUADRANT_HATCHES,
-    QUADRANT_NAMES,
     QUADRANTS,
     figure_style,
     plain_logarithm,
-    strength_name,
-    with_strength,
 )
 
 #: Shares below this are too narrow to carry their number.
