@@ -1,8 +1,6 @@
-"""The list of figures: what each shows, where it stands in the report, and drawing them all."""
+"""The list of figures: what each shows, and where it stands in the report."""
 
-from pathlib import Path
-
-from odisar.report.exhibits import Drawn, Plate
+from odisar.report.exhibits import Plate
 from odisar.report.figures.baselines import (
     alternatives_by_strength,
     baselines_by_scenario,
@@ -33,7 +31,7 @@ from odisar.report.figures.forecasting import (
     studied_error_by_step,
 )
 from odisar.report.figures.leakage import leakage_panel
-from odisar.report.figures.learning import training_curves, tuning_trials
+from odisar.report.figures.learning import training_curves
 from odisar.report.figures.onsets import score_around_onset
 from odisar.report.figures.operating import operating_point
 from odisar.report.figures.pairs import has_pairs, paired_differences
@@ -46,9 +44,7 @@ from odisar.report.figures.ranking import roc_by_strength
 from odisar.report.figures.recordings import recordings_overview
 from odisar.report.figures.reliability import reliability_diagram
 from odisar.report.judged import has_events, has_false_alarm_hours
-from odisar.report.load import Results
 from odisar.report.picking import lead_time_note, left_out_note
-from odisar.report.style import save_figure
 
 _BEST = (
     "Of the cheap alternatives only that with the best mean AUROC on these very recordings is "
@@ -279,26 +275,3 @@ PLATES = (
         training_curves,
     ),
 )
-
-
-def draw_figures(results: Results, folder: Path) -> list[Drawn]:
-    """Draw every figure that applies into an emptied folder, as ``<name>-<subject>.png``."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("*.png"):
-        old.unlink()
-    drawn = []
-    for plate in PLATES:
-        subjects = results.setups if plate.scope == "setup" else results.cases
-        for subject in subjects:
-            if plate.applies(results, subject):
-                path = folder / f"{plate.name}-{subject}.png"
-                save_figure(plate.draw(results, subject), path, f"{plate.title}: {subject}")
-                caption = f"{plate.caption} {plate.note(results, subject)}".strip()
-                drawn.append(Drawn(plate.section, subject, caption, path))
-    path = folder / "tuning-trials.png"
-    save_figure(tuning_trials(results), path, "Tuning trials of each set-up")
-    caption = "Every tuning trial's validation loss; no disturbed recording is looked at."
-    if any(len(results.tuning(setup)) > 1 for setup in results.setups):
-        caption += " Each fold has a study of its own; their trials stand side by side."
-    drawn.append(Drawn("learning", "", caption, path))
-    return drawn

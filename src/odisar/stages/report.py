@@ -9,6 +9,7 @@ import torch
 from odisar.artifacts import Workspace
 from odisar.config.loader import ConfigView
 from odisar.report.body import render_body
+from odisar.report.drawing import draw_figures
 from odisar.report.examples import (
     Tested,
     choose_examples,
@@ -18,7 +19,6 @@ from odisar.report.examples import (
     traces_table,
     write_examples,
 )
-from odisar.report.gallery import draw_figures
 from odisar.report.load import Results, report_folder
 from odisar.report.notebooks import execute_notebooks
 from odisar.report.simulator_checks import check_simulator

@@ -6,12 +6,13 @@ from PIL import Image
 from odisar.artifacts import write_json
 from odisar.config.loader import load_config
 from odisar.report.clock import clock
+from odisar.report.drawing import draw_figures
 from odisar.report.figures.baselines import baselines_by_strength
 from odisar.report.figures.events import fault_shares, forecast_examples
 from odisar.report.figures.learning import tuning_trials
 from odisar.report.figures.quadrants import quadrant_distribution
 from odisar.report.figures.recordings import recordings_overview
-from odisar.report.gallery import PLATES, draw_figures
+from odisar.report.gallery import PLATES
 from odisar.report.picking import drawn_scenarios, left_out_note
 from odisar.report.style import QUADRANTS, channel_label, save_figure
 

@@ -3,8 +3,8 @@ import re
 import pytest
 
 from odisar.report.body import render_body
+from odisar.report.exhibits import Drawn
 from odisar.report.figures.learning import tuning_trials
-from odisar.report.gallery import Drawn
 from odisar.report.load import SECTIONS
 from odisar.report.page import RunFacts, render_page
 from odisar.report.stamp import page_content

@@ -1,3 +1,4 @@
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -38,6 +39,41 @@ def test_a_failure_comes_out_as_it_was_raised(workers):
 
 def test_a_single_job_starts_no_process():
     assert run_jobs(slow_square, [3], 8) == [(9, os.getpid())]
+
+
+PREPARED = """
+import sys
+from odisar.stages.parallel import prepare_jobs, run_jobs
+from test_parallel import is_loaded
+if __name__ == "__main__":
+    workers = int(sys.argv[1])
+    prepare_jobs("wave", workers)
+    assert not is_loaded("wave")
+    print(run_jobs(is_loaded, ["wave", "sched"], 2))
+"""
+
+
+def is_loaded(module: str) -> bool:
+    return module in sys.modules
+
+
+@pytest.mark.skipif(
+    "forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a server"
+)
+@pytest.mark.parametrize("workers", [1, 2])
+def test_processes_have_what_was_prepared_for_them_loaded_and_nothing_else(tmp_path, workers):
+    script = tmp_path / "prepared.py"
+    script.write_text(PREPARED)
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    done = subprocess.run(
+        [sys.executable, script, str(workers)],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    # One worker needs no server: its jobs stay in this process.
+    assert done.stdout.strip() == str([workers == 2, False])
 
 
 def tell_process_and_sleep(path: Path) -> None:

@@ -1,11 +1,13 @@
+import importlib
 import shutil
 
 import pytest
 from mlflow.tracking import MlflowClient
 
 from odisar.errors import OdisarError
-from odisar.stages import preprocess
-from odisar.stages.runner import run_stage
+from odisar.stages import preprocess, runner
+from odisar.stages.runner import STAGES, run_stage
+from odisar.study import runner as study
 
 
 @pytest.fixture
@@ -56,3 +58,12 @@ def test_a_stage_sees_and_logs_the_sections_it_declares_and_no_other(workspace, 
     logged = runs(workspace)["preprocess"].data.params
     assert logged["pipeline.workers"] == "2"
     assert not any(name.startswith("training.") for name in logged)
+
+
+def test_processes_are_prepared_for_what_runs_some():
+    for package, names, prepared in (
+        ("stages", STAGES, runner._OF_MEMBERS),
+        ("study", study.PARTS, study._SIDE_BY_SIDE),
+    ):
+        modules = {name: importlib.import_module(f"odisar.{package}.{name}") for name in names}
+        assert {n for n, module in modules.items() if hasattr(module, "run_jobs")} == set(prepared)
