@@ -57,7 +57,7 @@ smoke: $(INSTALLED)  ## The whole pipeline on a small profile, in workspaces/smo
 
 study-setup: $(STUDY_INSTALLED)  ## Install what the study's alternatives need besides
 
-study: $(STUDY_INSTALLED)  ## After `make repro`: all alternatives, seeds, forecasts (over an hour)
+study: $(STUDY_INSTALLED)  ## After `make repro`: all alternatives, seeds, forecasts (three quarters of an hour)
 	@$(BIN)/python -m dvc repro study/dvc.yaml
 	@# The report takes the study in where there is one, so it can't depend on it.
 	@$(BIN)/python -m dvc repro --single-item --force report

@@ -4,7 +4,8 @@ Nobody has a true model of a real machine, so what could be reached at best is n
 the next best thing: for every fault (kind, channel, size) a logistic regression on the twin's
 innovations, and one on parity residuals as well, is trained on copies of calibration recordings
 that hold this fault alone, then judged on the test recordings by protocol P2 as the monitor is. It
-has been told what to look for, where, and how large it is; the monitor has not. The last column is
+has been told what to look for, where, and how large it is; the monitor has not. For noise there is
+also what the monitor's own statistic of noise says of the guilty channel alone. The last column is
 what the twin usually leaves of that channel in one sample, given all others, in the channel's unit.
 Run it from the project's root after `make real`:
 
@@ -23,9 +24,10 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from odisar.artifacts import Workspace, read_json
-from odisar.capability.combined import ODISAR
+from odisar.capability.combined import ODISAR, Run
 from odisar.capability.innovation_values import InnovationScoreValues
 from odisar.capability.innovations import InnovationScore, moving_mean
+from odisar.capability.responses import blamed_names
 from odisar.capability.scoring import Scorer
 from odisar.config.loader import Config, load_config
 from odisar.evaluation.labels import label_active
@@ -50,6 +52,8 @@ SEEDS = range(4)
 
 #: What a regression is given: it may learn less from more.
 GIVEN = INNOVATIONS, ALL = "shown, innovations", "shown, all"
+#: The monitor's own statistic, which is told the channel alone.
+OWN = "its channel"
 
 #: Kind, channel and size of a fault.
 Fault = tuple[str, str, str]
@@ -59,11 +63,12 @@ Fault = tuple[str, str, str]
 class Seen:
     """A faulty recording as a twin saw it: (time, ...) what is known, and what is true.
 
-    ``features`` are (time, feature) by what is given.
+    ``features`` are (time, feature) by what is given, ``untold`` (time,) scores of the monitor and
+    of its statistic of noise, which know no fault.
     """
 
     features: dict[str, Array]
-    score: Array
+    untold: dict[str, Array]
     labels: NDArray[np.bool_]
 
 
@@ -74,7 +79,7 @@ class Watcher:
         self.data: MemberData = load_member(config, workspace, member)
         limits = read_json(workspace.thresholds(member.setup))["members"][member.name]
         fitted = InnovationScoreValues.model_validate(limits["innovation"]).build()
-        self._fitted = fitted.parts
+        self._fitted, self._noise = fitted.parts, fitted.noise
         self._score: InnovationScore = fitted.parts.twin
         self._threshold: float = limits["sigma"][ODISAR]
         self._scorer = Scorer(read_twin(workspace.twin(member.name)), 256, "cpu", fitted)
@@ -99,7 +104,8 @@ class Watcher:
                 found = self._scorer.score(item, short_lead_steps=self.data.case.short_lead_steps)
                 labels = label_active(item.time_s[found.positions], item.intervals)
                 score = found.scores[ODISAR].astype(np.float64) / self._threshold
-                for start, stop in found.runs:
+                runs = self._scorer.runs(item, found)
+                for (start, stop), parts in zip(found.runs, runs, strict=True):
                     seen = found.innovations[start:stop]
                     tied = self._fitted.relations.residuals(found.samples[start:stop])
                     known = slice(self.data.spec.horizon_steps, None)
@@ -108,7 +114,16 @@ class Watcher:
                     more = informed(tied, columns, self._fitted.consistency)[known]
                     features = {INNOVATIONS: told, ALL: np.hstack([told, more])}
                     run = slice(start + self.data.spec.horizon_steps, stop)
-                    yield fault, Seen(features, score[run], labels[run])
+                    untold = {"ODiSAR": score[run]}
+                    if fault[0] == "noise":
+                        untold[OWN] = self.noise(parts, fault[1])[known]
+                    yield fault, Seen(features, untold, labels[run])
+
+    def noise(self, run: Run, channel: str) -> Array:
+        """Return (time,) what the monitor's statistic of noise says of one channel."""
+        squares = run.outliers(self._fitted.closed_form.size.precision)
+        state = blamed_names(self._scorer.twin).index(channel)
+        return self._noise.score(squares[:, [state]])
 
     def columns(self, channel: str) -> list[int]:
         """Return where a channel stands among the state features.
@@ -150,8 +165,7 @@ def informed(innovations: Array, columns: Sequence[int], score: InnovationScore)
 
 def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
     """Return a row for each fault, over all members of a set-up."""
-    told: dict[tuple[str, Fault], list[Array]] = {}
-    untold: dict[Fault, list[Array]] = {}
+    scores: dict[Fault, dict[str, list[Array]]] = {}
     truth: dict[Fault, list[NDArray[np.bool_]]] = {}
     for watcher in watchers:
         copies, test = watcher.faulty()
@@ -162,20 +176,20 @@ def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
             (name, fault): Told.by(parts, name) for fault, parts in shown.items() for name in GIVEN
         }
         for fault, seen in watcher.watch(test):
-            known = np.isfinite(seen.features[ALL]).all(axis=1) & np.isfinite(seen.score)
+            known = np.isfinite([*seen.features[ALL].T, *seen.untold.values()]).all(axis=0)
+            said = {name: values[known] for name, values in seen.untold.items()}
             for name in GIVEN:
-                said = models[name, fault].score(seen.features[name][known])
-                told.setdefault((name, fault), []).append(said)
-            untold.setdefault(fault, []).append(seen.score[known])
+                said[name] = models[name, fault].score(seen.features[name][known])
             truth.setdefault(fault, []).append(seen.labels[known])
+            for name, values in said.items():
+                scores.setdefault(fault, {}).setdefault(name, []).append(values)
     rows = []
     for fault in sorted(truth):
         labels = np.concatenate(truth[fault])
         row: dict[str, object] = dict(zip(("kind", "channel", "size"), fault, strict=True))
-        judged_scores = {"ODiSAR": untold[fault]} | {name: told[name, fault] for name in GIVEN}
-        for name, scores in judged_scores.items():
-            row[f"{name}, AUROC"] = auroc(np.concatenate(scores), labels)
-            row[f"{name}, TNR@TPR95"] = tnr_at_tpr95(np.concatenate(scores), labels)
+        for name, parts in scores[fault].items():
+            row[f"{name}, AUROC"] = auroc(np.concatenate(parts), labels)
+            row[f"{name}, TNR@TPR95"] = tnr_at_tpr95(np.concatenate(parts), labels)
         row["usual innovation"] = np.mean([watcher.usual(fault[1]) for watcher in watchers])
         rows.append(row)
     return pd.DataFrame(rows)
