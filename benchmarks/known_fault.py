@@ -54,6 +54,7 @@ SEEDS = range(4)
 GIVEN = INNOVATIONS, ALL = "shown, innovations", "shown, all"
 #: The monitor's own statistic, which is told the channel alone.
 OWN = "its channel"
+USUAL = "usual innovation"
 
 #: Kind, channel and size of a fault.
 Fault = tuple[str, str, str]
@@ -190,9 +191,10 @@ def judged(watchers: Sequence[Watcher]) -> pd.DataFrame:
         for name, parts in scores[fault].items():
             row[f"{name}, AUROC"] = auroc(np.concatenate(parts), labels)
             row[f"{name}, TNR@TPR95"] = tnr_at_tpr95(np.concatenate(parts), labels)
-        row["usual innovation"] = np.mean([watcher.usual(fault[1]) for watcher in watchers])
+        row[USUAL] = np.mean([watcher.usual(fault[1]) for watcher in watchers])
         rows.append(row)
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    return table[[*table.columns.drop(USUAL), USUAL]]
 
 
 @dataclass(frozen=True)

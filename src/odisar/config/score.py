@@ -12,7 +12,8 @@ FEWEST_KNOWN = 20
 #: Computing time and storage grow with the memory for shifts.
 LONGEST_MEMORY = 1000
 
-#: How much further out than elsewhere something must be to be heard, on the common log scale.
+#: How much further out than elsewhere something must be to be heard, on the common log scale;
+#: below zero, how much less far.
 Margin = Annotated[float, Field(ge=-1, le=100)]
 
 _Weight = Annotated[float, Field(ge=0, lt=1)]

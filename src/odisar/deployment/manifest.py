@@ -20,6 +20,7 @@ MANIFEST_FILE = "manifest.json"
 #: 5: it lets go of something strong that is over.
 #: 6: it seeks the shift of one state.
 #: 7: it holds statistics to the newer half of their windows.
+#: 8: it holds the noise of one sensor to it as well; margins may lie below zero.
 SCHEMA_VERSION = 8
 #: No manifest is longer, no other JSON, and no file of a bundle at all: bytes.
 MANIFEST_LIMIT = 1_000_000

@@ -212,9 +212,9 @@ def _judging(draft: Draft) -> Iterator[str]:
     scatter = flow(steps=20, share=0.0)
     yield line(12, f"scatter: {scatter}", note="share: raise where disturbances last for minutes")
     noise = flow(lasting_steps=10, recent_steps=3, recent_share=0.5, margin=0.3)
-    yield line(12, f"noise: {noise}", note="margin: 0 hears one noisy sensor soonest")
+    yield line(12, f"noise: {noise}", note="margin: less hears one noisy sensor sooner")
     shift = flow(memory_steps=100, margin=0.5)
-    yield line(12, f"shift: {shift}", note="margin: 0 hears a sensor that reads wrong soonest")
+    yield line(12, f"shift: {shift}", note="margin: less hears a sensor that reads wrong sooner")
     release = flow(steps=10, share=0.5)
     yield line(12, f"release: {release}", note="lets go of something strong that is over")
     yield line(

@@ -1,9 +1,12 @@
 """Run the members of a stage side by side, one process and one torch thread each."""
 
 import os
+import signal
+import sys
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import forkserver, get_all_start_methods, get_context, parent_process
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from itertools import islice
+from multiprocessing import forkserver, get_context, parent_process
 from threading import Thread
 from typing import TypeVar
 
@@ -12,19 +15,25 @@ from tqdm import tqdm
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-#: Processes are copies of a server that has imported everything and done nothing, where the system
-#: can do that; elsewhere each imports for itself.
-_START = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+#: Processes are copies of a server that has imported everything and begun nothing. Elsewhere than
+#: on Linux each imports for itself: there a copy of a process may lack what libraries need.
+_START = "forkserver" if sys.platform == "linux" else "spawn"
 
 
 def prepare_jobs(module: str, workers: int) -> None:
     """Let the server of ``run_jobs`` import a module, while this process goes on.
 
-    Imports of the libraries take seconds: so they are done once, beside this process's own.
+    Imports of the libraries take seconds: so they are done once, beside this process's own. Of a
+    process the first call counts, and the environment of that moment.
     """
     if workers > 1 and _START == "forkserver":
         get_context(_START).set_forkserver_preload([module])
-        forkserver.ensure_running()
+        # While it imports, the server would answer Ctrl-C with a traceback.
+        answer = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.signal(signal.SIGINT, answer)
 
 
 def show_progress(items: Sequence[Job], name: str, position: int) -> Iterable[Job]:
@@ -45,21 +54,36 @@ def run_jobs(function: Callable[[Job], Result], jobs: Sequence[Job], workers: in
     if min(workers, len(jobs)) <= 1:
         return [function(job) for job in jobs]
     start = get_context(_START)
-    with ProcessPoolExecutor(min(workers, len(jobs)), start, _end_with_parent) as pool:
-        futures = [pool.submit(function, job) for job in jobs]
-        try:
-            return [future.result() for future in futures]
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with ProcessPoolExecutor(min(workers, len(jobs)), start, _begin_process) as pool:
+        return _run_in_turn(pool, function, jobs, workers)
 
 
-def _end_with_parent() -> None:
-    """End this process as soon as the one that started it is gone, killed or not.
+def _run_in_turn(
+    pool: Executor, function: Callable[[Job], Result], jobs: Sequence[Job], workers: int
+) -> list[Result]:
+    """Hand over as many jobs as there are workers: what waits in a pool can't be called back."""
+    left = iter(range(len(jobs)))
+    running: dict[Future[Result], int] = {}
+    results: dict[int, Result] = {}
+    ended = workers
+    while True:
+        for number in islice(left, ended):
+            running[pool.submit(function, jobs[number])] = number
+        if not running:
+            return [results[number] for number in range(len(jobs))]
+        done, _ = wait(running, return_when=FIRST_COMPLETED)
+        results |= {running.pop(future): future.result() for future in done}
+        ended = len(done)
+
+
+def _begin_process() -> None:
+    """Answer Ctrl-C, and end as soon as the process that started this one is gone, killed or not.
 
     A pool's processes don't notice by themselves: they would finish their job for nobody, and then
     wait for another for ever.
     """
+    # The server, which was started without, hands its deafness on.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     parent = parent_process()
     if parent is not None:
         Thread(target=_exit_after, args=(parent.join,), daemon=True).start()

@@ -37,6 +37,21 @@ def test_a_failure_comes_out_as_it_was_raised(workers):
         run_jobs(fail_at_two, range(4), workers)
 
 
+def begin(given: tuple[Path, int]) -> None:
+    folder, number = given
+    (folder / str(number)).touch()
+    if number == 0:
+        raise OdisarError("job 0 cannot be done")
+    time.sleep(1.0)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_after_a_failure_no_further_job_is_begun(tmp_path, workers):
+    with pytest.raises(OdisarError, match="job 0 cannot be done"):
+        run_jobs(begin, [(tmp_path, number) for number in range(6)], workers)
+    assert {path.name for path in tmp_path.iterdir()} == {str(n) for n in range(workers)}
+
+
 def test_a_single_job_starts_no_process():
     assert run_jobs(slow_square, [3], 8) == [(9, os.getpid())]
 
@@ -89,6 +104,41 @@ from odisar.stages.parallel import run_jobs
 if __name__ == "__main__":
     run_jobs(tell_process_and_sleep, [Path(name) for name in sys.argv[1:]], 2)
 """
+
+
+INTERRUPTED = """
+import sys
+from pathlib import Path
+from test_parallel import tell_process_and_sleep
+from odisar.stages.parallel import prepare_jobs, run_jobs
+if __name__ == "__main__":
+    prepare_jobs("odisar.errors", 2)
+    try:
+        run_jobs(tell_process_and_sleep, [Path(name) for name in sys.argv[1:]], 2)
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+def test_ctrl_c_ends_what_runs_and_begins_nothing_more(tmp_path):
+    script, paths = tmp_path / "interrupted.py", [tmp_path / name for name in "abcd"]
+    script.write_text(INTERRUPTED)
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    parent = subprocess.Popen(
+        [sys.executable, script, *paths],
+        env=os.environ | {"PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while sum(p.exists() and bool(p.read_text()) for p in paths) < 2:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    os.killpg(parent.pid, signal.SIGINT)
+    said, _ = parent.communicate(timeout=30)
+    assert said == "interrupted\n"
+    assert sum(p.exists() for p in paths) == 2
 
 
 def is_running(process: int) -> bool:
