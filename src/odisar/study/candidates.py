@@ -39,13 +39,11 @@ Statistics = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A score to choose from: ``of`` makes it of statistics, ``parts`` counts those.
+    """A score to choose from: ``of`` makes it of statistics.
 
-    Newer halves of windows aside.
-
-    One that doesn't use the twin is there to be compared with, not to be chosen. With ``margins``
-    it is that, or one sensor's noise or shift less its margin, whichever is rarest, and with a
-    ``release`` it lets go of what is over.
+    ``parts`` counts those, newer halves of windows aside. One that doesn't use the twin is there to
+    be compared with, not to be chosen. With ``margins`` it is that, or one sensor's noise or shift
+    less its margin, whichever is rarest, and with a ``release`` it lets go of what is over.
     """
 
     name: str

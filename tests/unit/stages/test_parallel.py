@@ -1,4 +1,3 @@
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -72,9 +71,7 @@ def is_loaded(module: str) -> bool:
     return module in sys.modules
 
 
-@pytest.mark.skipif(
-    "forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a server"
-)
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is prepared")
 @pytest.mark.parametrize("workers", [1, 2])
 def test_processes_have_what_was_prepared_for_them_loaded_and_nothing_else(tmp_path, workers):
     script = tmp_path / "prepared.py"
@@ -139,6 +136,37 @@ def test_ctrl_c_ends_what_runs_and_begins_nothing_more(tmp_path):
     said, _ = parent.communicate(timeout=30)
     assert said == "interrupted\n"
     assert sum(p.exists() for p in paths) == 2
+
+
+PREPARING = """
+import time
+from odisar.stages.parallel import prepare_jobs
+if __name__ == "__main__":
+    prepare_jobs("odisar.stages.train", 2)
+    print("preparing", flush=True)
+    try:
+        time.sleep(60)
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is prepared")
+def test_ctrl_c_while_libraries_are_imported_ends_in_no_traceback(tmp_path):
+    script = tmp_path / "preparing.py"
+    script.write_text(PREPARING)
+    parent = subprocess.Popen(
+        [sys.executable, script],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert parent.stdout.readline() == "preparing\n"
+    time.sleep(0.5)  # the server has begun to import torch, which takes longer
+    os.killpg(parent.pid, signal.SIGINT)
+    assert parent.communicate(timeout=60) == ("interrupted\n", "")
 
 
 def is_running(process: int) -> bool:
