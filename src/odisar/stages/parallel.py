@@ -5,6 +5,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from functools import partial
 from itertools import islice
 from multiprocessing import forkserver, get_context, parent_process
 from threading import Thread
@@ -54,7 +55,10 @@ def run_jobs(function: Callable[[Job], Result], jobs: Sequence[Job], workers: in
     if min(workers, len(jobs)) <= 1:
         return [function(job) for job in jobs]
     start = get_context(_START)
-    with ProcessPoolExecutor(min(workers, len(jobs)), start, _begin_process) as pool:
+    # What was started in the background of a script is meant to go on.
+    answers = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    begin = partial(_begin_process, answers=answers)
+    with ProcessPoolExecutor(min(workers, len(jobs)), start, begin) as pool:
         return _run_in_turn(pool, function, jobs, workers)
 
 
@@ -76,14 +80,15 @@ def _run_in_turn(
         ended = len(done)
 
 
-def _begin_process() -> None:
-    """Answer Ctrl-C, and end as soon as the process that started this one is gone, killed or not.
+def _begin_process(*, answers: bool) -> None:
+    """Answer Ctrl-C as the parent does, and end as soon as that one is gone, killed or not.
 
     A pool's processes don't notice by themselves: they would finish their job for nobody, and then
     wait for another for ever.
     """
     # The server, which was started without, hands its deafness on.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if answers:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     parent = parent_process()
     if parent is not None:
         Thread(target=_exit_after, args=(parent.join,), daemon=True).start()

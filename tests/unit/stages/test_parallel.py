@@ -104,11 +104,13 @@ if __name__ == "__main__":
 
 
 INTERRUPTED = """
+import signal
 import sys
 from pathlib import Path
 from test_parallel import tell_process_and_sleep
 from odisar.stages.parallel import prepare_jobs, run_jobs
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # not so in background
     prepare_jobs("odisar.errors", 2)
     try:
         run_jobs(tell_process_and_sleep, [Path(name) for name in sys.argv[1:]], 2)
@@ -139,9 +141,11 @@ def test_ctrl_c_ends_what_runs_and_begins_nothing_more(tmp_path):
 
 
 PREPARING = """
+import signal
 import time
 from odisar.stages.parallel import prepare_jobs
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # not so in background
     prepare_jobs("odisar.stages.train", 2)
     print("preparing", flush=True)
     try:
